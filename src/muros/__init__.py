@@ -1,0 +1,3 @@
+"""Robot middleware from a microcontroller to a fleet."""
+
+__version__ = "0.1.0"
