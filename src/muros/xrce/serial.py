@@ -1,0 +1,151 @@
+"""Frames of serial lines as Micro XRCE-DDS peers send them: HDLC-like, with escaping and CRC-16/ARC.
+
+A frame is ``7E``, then with every 7E and 7D escaped as ``7D (byte xor 20)``: source address, destination address,
+length of the message (u16 little endian), the message, its CRC (u16 little endian, over the unescaped message
+only). There is no closing flag. A 7E inside a frame starts a new one, so a receiver is in step again at the next
+frame after any noise.
+"""
+
+from array import array
+
+from muros.compat import MPY, const
+
+if MPY:
+    try:
+        from muros.xrce._viper import NATIVE, crc16, stuff, unstuff
+    except (SyntaxError, ValueError, ImportError):  # this build has no native emitter
+        from muros.xrce._codec import NATIVE, crc16, stuff, unstuff
+else:
+    from muros.xrce._codec import NATIVE, crc16, stuff, unstuff
+
+_FLAG = const(0x7E)
+_HEAD = const(4)
+_CRC = const(2)
+_CHUNK = const(64)
+
+BROADCAST = 255
+
+
+class SerialDeframer:
+    """Takes the bytes of a line as they come and hands on the messages of good frames.
+
+    ``on_frame(buf, off, n, source)`` is called for each; ``buf[off:off + n]`` is valid until it returns.
+    ``local_address`` is ours: frames for others are passed over (-1 takes every frame). ``capacity`` is the longest
+    message taken, in bytes. Counters: ``frames`` good ones, ``bad_crc``, ``bad_length`` (longer than the capacity),
+    ``wrong_address``, ``cut`` (a new frame began inside one), ``garbage`` bytes outside frames.
+    """
+
+    def __init__(self, local_address: int, capacity: int, on_frame: object = None) -> None:
+        self.on_frame = on_frame
+        self.capacity = capacity
+        self.frames = 0
+        self.bad_crc = 0
+        self.bad_length = 0
+        self.wrong_address = 0
+        self.cut = 0
+        self.garbage = 0
+        self._local = local_address
+        self._buf = bytearray(_HEAD + capacity + _CRC)
+        self._state = array("i", (0, 0, 0, 0))
+        self._inside = False
+
+    def feed(self, data: "bytes | bytearray | memoryview", n: int) -> None:
+        """Takes ``data[:n]``; calls ``on_frame`` for each frame that it completes."""
+        state = self._state
+        buf = self._buf
+        state[0] = 0
+        while state[0] < n:
+            if not self._inside:
+                self._hunt(data, n)
+            elif unstuff(data, n, buf, state):
+                if state[1] > 0:  # two flags in a row are fill between frames, nothing is lost
+                    self.cut += 1
+                self._begin()
+            elif state[1] == state[2]:
+                self._advance()
+
+    def _hunt(self, data: "bytes | bytearray | memoryview", n: int) -> None:
+        state = self._state
+        i = state[0]
+        start = i
+        while i < n and data[i] != _FLAG:
+            i += 1
+        self.garbage += i - start
+        if i < n:
+            self._begin()
+            i += 1
+        state[0] = i
+
+    def _begin(self) -> None:
+        state = self._state
+        state[1] = 0
+        state[2] = _HEAD
+        state[3] = 0
+        self._inside = True
+
+    def _advance(self) -> None:
+        state = self._state
+        buf = self._buf
+        n = buf[2] | buf[3] << 8
+        if state[2] == _HEAD:
+            if self._local >= 0 and buf[1] != self._local and buf[1] != BROADCAST:
+                self.wrong_address += 1
+                self._inside = False
+            elif n > self.capacity:
+                self.bad_length += 1
+                self._inside = False
+            else:
+                state[2] = _HEAD + n + _CRC
+            return
+        self._inside = False
+        end = _HEAD + n
+        if crc16(buf, _HEAD, n) != buf[end] | buf[end + 1] << 8:
+            self.bad_crc += 1
+            return
+        self.frames += 1
+        self.on_frame(buf, _HEAD, n, buf[0])  # type: ignore[operator]
+
+
+class SerialFramer:
+    """Frames messages for a line through a small buffer, so that a board needs no second copy of a message.
+
+    ``write(buf, n)`` takes ``n`` bytes of ``buf`` to the line and returns when they are taken.
+    """
+
+    def __init__(self, source: int, destination: int, write: object) -> None:
+        self.source = source
+        self.destination = destination
+        self._write = write
+        self._out = bytearray(2 * _CHUNK)
+        self._head = bytearray(_HEAD)
+
+    def send(self, buf: "bytes | bytearray | memoryview", off: int, n: int) -> None:
+        """Sends ``buf[off:off + n]`` as one frame."""
+        out = self._out
+        head = self._head
+        write = self._write
+        head[0] = self.source
+        head[1] = self.destination
+        head[2] = n & 255
+        head[3] = n >> 8
+        out[0] = _FLAG
+        pos = stuff(head, 0, _HEAD, out, 1)
+        end = off + n
+        crc = crc16(buf, off, n)
+        while off < end:
+            k = (len(out) - pos) >> 1
+            if k < 8:
+                write(out, pos)  # type: ignore[operator]
+                pos = 0
+                continue
+            if k > end - off:
+                k = end - off
+            pos = stuff(buf, off, k, out, pos)
+            off += k
+        if len(out) - pos < 2 * _CRC:
+            write(out, pos)  # type: ignore[operator]
+            pos = 0
+        head[0] = crc & 255
+        head[1] = crc >> 8
+        pos = stuff(head, 0, _CRC, out, pos)
+        write(out, pos)  # type: ignore[operator]
