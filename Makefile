@@ -1,0 +1,53 @@
+# Everything a developer runs. `make` or `make help` lists the targets; the first one used sets the clone up.
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+BIN := .venv/bin
+PYTEST_ARGS ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help setup test lint unit format coverage demo bench docs-check changelog build clean distclean
+
+help: ## List the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+setup: ## Create .venv and install everything the checks need (quick when nothing changed)
+	@tools/setup.sh
+
+test: lint unit ## Everything: lint, types, layers, all tests on CPython and MicroPython
+
+lint: setup ## Style, formatting, types and the order of the rooms
+	@echo "== ruff" && $(BIN)/ruff check --quiet . && $(BIN)/ruff format --quiet --check .
+	@echo "== mypy --strict" && $(BIN)/mypy --no-error-summary
+	@echo "== import-linter" && $(BIN)/lint-imports --no-logo | tail -n +6
+
+unit: setup ## All tests (PYTEST_ARGS="tests/xrce -k stream" chooses)
+	@echo "== pytest" && $(BIN)/pytest $(PYTEST_ARGS)
+
+format: setup ## Let ruff mend style and formatting
+	@$(BIN)/ruff check --quiet --fix . ; $(BIN)/ruff format --quiet .
+
+coverage: setup ## All tests with line and branch coverage
+	@$(BIN)/pytest --cov --cov-report=term $(PYTEST_ARGS)
+
+demo: setup ## A board, an agent and the space talking to each other, in one terminal
+	@$(BIN)/python examples/demo.py
+
+bench: setup ## Every benchmark in bench/
+	@for script in bench/bench_*.py; do echo "== $$script" && $(BIN)/python "$$script" || exit 1; done
+
+docs-check: setup ## Links inside the documentation, and that each changelog fragment is well-formed
+	@$(BIN)/pytest -q tests/test_documents.py
+
+changelog: setup ## Show what the next release's changelog will say
+	@$(BIN)/towncrier build --draft --version next
+
+build: setup ## Wheel and source archive into dist/
+	@$(BIN)/hatchling build
+
+clean: ## Remove caches and built files, keep .venv
+	@rm -rf build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .coverage
+	@find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+distclean: clean ## Remove .venv too
+	@rm -rf .venv

