@@ -58,6 +58,8 @@ else:
         """A byte view that aliases the storage of an array or buffer, without copying."""
         return memoryview(values).cast("B")  # type: ignore[arg-type]
 
-    def copy(target: bytearray, at: int, source: "bytes | bytearray | memoryview", start: int, n: int) -> None:
+    def copy(
+        target: bytearray, at: int, source: "bytes | bytearray | memoryview", start: int, n: int
+    ) -> None:
         """Copies ``n`` bytes of ``source`` from ``start`` into ``target`` at ``at``."""
         target[at : at + n] = source[start : start + n]

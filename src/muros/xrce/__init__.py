@@ -8,7 +8,9 @@ package gathers no names:
 module                runs on    holds
 ====================  =========  =======================================================================
 ``constants``         hosts      the wire constants of the specification, by name
-``streams``           both       best-effort and reliable streams, as sender and as receiver
+``outputs``           both       best-effort and reliable streams, as sender
+``inputs``            both       best-effort and reliable streams, as receiver
+``queues``            hosts      the same for hosts with many sessions
 ``fragments``         both       joining and cutting samples that are larger than a message
 ``session``           both       a session: headers, streams, acknowledgements; either role
 ``create``            both       CREATE and READ_DATA payloads, as a client writes them

@@ -3,7 +3,13 @@
 The CRC is CRC-16/ARC: polynomial 0x8005 reflected, initial value 0, no final xor.
 """
 
-from muros.compat import MPY, const
+from muros.compat import const
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from array import array
+
+    from muros.xrce._types import Buffer
 
 NATIVE = False
 
@@ -11,45 +17,26 @@ _FLAG = const(0x7E)
 _ESCAPE = const(0x7D)
 _FLIP = const(0x20)
 
-if MPY:
-    # 16 entries, low byte first: a board has no room for the table of 256
-    _NIBBLES = (
-        b"\x00\x00\x01\xcc\x01\xd8\x00\x14\x01\xf0\x00\x3c\x00\x28\x01\xe4"
-        b"\x01\xa0\x00\x6c\x00\x78\x01\xb4\x00\x50\x01\x9c\x01\x88\x00\x44"
-    )
-
-    def crc16(buf, off, n, crc=0):  # type: ignore[no-untyped-def]
-        """CRC-16/ARC of ``buf[off:off + n]``, continuing from ``crc``."""
-        table = _NIBBLES
-        for i in range(off, off + n):
-            crc ^= buf[i]
-            k = (crc & 15) << 1
-            crc = crc >> 4 ^ (table[k] | table[k + 1] << 8)
-            k = (crc & 15) << 1
-            crc = crc >> 4 ^ (table[k] | table[k + 1] << 8)
-        return crc
-
-else:
-
-    def _table() -> list[int]:
-        table = []
-        for value in range(256):
-            for _ in range(8):
-                value = value >> 1 ^ (0xA001 if value & 1 else 0)
-            table.append(value)
-        return table
-
-    _BYTES = _table()
-
-    def crc16(buf: "bytes | bytearray | memoryview", off: int, n: int, crc: int = 0) -> int:
-        """CRC-16/ARC of ``buf[off:off + n]``, continuing from ``crc``."""
-        table = _BYTES
-        for byte in memoryview(buf)[off : off + n]:
-            crc = crc >> 8 ^ table[(crc ^ byte) & 255]
-        return crc
+# 16 entries, low byte first: a board has no room for the table of 256
+_NIBBLES = (
+    b"\x00\x00\xcc\x01\xd8\x01\x14\x00\xf0\x01\x3c\x00\x28\x00\xe4\x01"
+    b"\xa0\x01\x6c\x00\x78\x00\xb4\x01\x50\x00\x9c\x01\x88\x01\x44\x00"
+)
 
 
-def stuff(source: "bytes | bytearray | memoryview", off: int, n: int, out: bytearray, pos: int) -> int:
+def crc16(buf: "Buffer", off: int, n: int, crc: int = 0) -> int:
+    """CRC-16/ARC of ``buf[off:off + n]``, continuing from ``crc``."""
+    table = _NIBBLES
+    for i in range(off, off + n):
+        crc ^= buf[i]
+        k = (crc & 15) << 1
+        crc = crc >> 4 ^ (table[k] | table[k + 1] << 8)
+        k = (crc & 15) << 1
+        crc = crc >> 4 ^ (table[k] | table[k + 1] << 8)
+    return crc
+
+
+def stuff(source: "Buffer", off: int, n: int, out: bytearray, pos: int) -> int:
     """Writes ``source[off:off + n]`` escaped into ``out`` at ``pos``; returns the position behind it.
 
     ``out`` needs room for twice ``n``.
@@ -65,7 +52,7 @@ def stuff(source: "bytes | bytearray | memoryview", off: int, n: int, out: bytea
     return pos
 
 
-def unstuff(source: "bytes | bytearray | memoryview", n: int, out: bytearray, state: "list[int]") -> int:
+def unstuff(source: "Buffer", n: int, out: bytearray, state: "list[int] | array[int]") -> int:
     """Unescapes into ``out`` until it holds what is wanted, a flag comes or ``source[:n]`` ends.
 
     ``state`` is [next index of source, bytes in out, bytes wanted in out, 1 behind an escape], updated in place.

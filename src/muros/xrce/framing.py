@@ -6,7 +6,9 @@ input, whole or byte by byte, gives the same calls. Foreign bytes only move coun
 
 from collections.abc import Callable
 
-from muros.xrce._codec import crc16, stuff
+from muros.xrce._codec import stuff
+from muros.xrce._crc import crc16
+from muros.xrce._types import Buffer
 from muros.xrce.serial import SerialDeframer, SerialFramer
 
 __all__ = [
@@ -59,7 +61,7 @@ class TcpDeframer:
         self._rest = b""
         self._skip = 0
 
-    def feed(self, data: bytes | bytearray | memoryview, n: int) -> None:
+    def feed(self, data: Buffer, n: int) -> None:
         """Takes ``data[:n]``; calls ``on_frame`` for each message that it completes."""
         data = bytes(data[:n])
         if self._skip:

@@ -12,11 +12,19 @@ from muros.compat import MPY, const
 
 if MPY:
     try:
-        from muros.xrce._viper import NATIVE, crc16, stuff, unstuff
+        from muros.xrce._viper import NATIVE as NATIVE
+        from muros.xrce._viper import crc16, stuff, unstuff
     except (SyntaxError, ValueError, ImportError):  # this build has no native emitter
-        from muros.xrce._codec import NATIVE, crc16, stuff, unstuff
+        from muros.xrce._codec import crc16, stuff, unstuff
 else:
-    from muros.xrce._codec import NATIVE, crc16, stuff, unstuff
+    from muros.xrce._codec import stuff, unstuff
+    from muros.xrce._crc import crc16
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from muros.xrce._types import Buffer
 
 _FLAG = const(0x7E)
 _HEAD = const(4)
@@ -35,7 +43,12 @@ class SerialDeframer:
     ``wrong_address``, ``cut`` (a new frame began inside one), ``garbage`` bytes outside frames.
     """
 
-    def __init__(self, local_address: int, capacity: int, on_frame: object = None) -> None:
+    def __init__(
+        self,
+        local_address: int,
+        capacity: int,
+        on_frame: "Callable[[bytearray, int, int, int], object] | None" = None,
+    ) -> None:
         self.on_frame = on_frame
         self.capacity = capacity
         self.frames = 0
@@ -49,7 +62,7 @@ class SerialDeframer:
         self._state = array("i", (0, 0, 0, 0))
         self._inside = False
 
-    def feed(self, data: "bytes | bytearray | memoryview", n: int) -> None:
+    def feed(self, data: "Buffer", n: int) -> None:
         """Takes ``data[:n]``; calls ``on_frame`` for each frame that it completes."""
         state = self._state
         buf = self._buf
@@ -64,7 +77,7 @@ class SerialDeframer:
             elif state[1] == state[2]:
                 self._advance()
 
-    def _hunt(self, data: "bytes | bytearray | memoryview", n: int) -> None:
+    def _hunt(self, data: "Buffer", n: int) -> None:
         state = self._state
         i = state[0]
         start = i
@@ -103,7 +116,8 @@ class SerialDeframer:
             self.bad_crc += 1
             return
         self.frames += 1
-        self.on_frame(buf, _HEAD, n, buf[0])  # type: ignore[operator]
+        if self.on_frame is not None:
+            self.on_frame(buf, _HEAD, n, buf[0])
 
 
 class SerialFramer:
@@ -112,14 +126,14 @@ class SerialFramer:
     ``write(buf, n)`` takes ``n`` bytes of ``buf`` to the line and returns when they are taken.
     """
 
-    def __init__(self, source: int, destination: int, write: object) -> None:
+    def __init__(self, source: int, destination: int, write: "Callable[[bytearray, int], object]") -> None:
         self.source = source
         self.destination = destination
         self._write = write
         self._out = bytearray(2 * _CHUNK)
         self._head = bytearray(_HEAD)
 
-    def send(self, buf: "bytes | bytearray | memoryview", off: int, n: int) -> None:
+    def send(self, buf: "Buffer", off: int, n: int) -> None:
         """Sends ``buf[off:off + n]`` as one frame."""
         out = self._out
         head = self._head
@@ -135,7 +149,7 @@ class SerialFramer:
         while off < end:
             k = (len(out) - pos) >> 1
             if k < 8:
-                write(out, pos)  # type: ignore[operator]
+                write(out, pos)
                 pos = 0
                 continue
             if k > end - off:
@@ -143,9 +157,9 @@ class SerialFramer:
             pos = stuff(buf, off, k, out, pos)
             off += k
         if len(out) - pos < 2 * _CRC:
-            write(out, pos)  # type: ignore[operator]
+            write(out, pos)
             pos = 0
         head[0] = crc & 255
         head[1] = crc >> 8
         pos = stuff(head, 0, _CRC, out, pos)
-        write(out, pos)  # type: ignore[operator]
+        write(out, pos)

@@ -1,0 +1,74 @@
+"""Samples larger than a message: cut into FRAGMENTs by the sender, joined by the receiver (DDS-XRCE 1.0, 8.3.5.14).
+
+The whole submessage, header and payload, is cut; each piece is the payload of a FRAGMENT, the last one flagged. Only
+reliable streams carry fragments, so the pieces come in order and none is missing.
+"""
+
+from muros.compat import const, copy
+
+_FRAGMENT = const(13)
+_LITTLE_ENDIAN = const(0x01)
+_LAST_FRAGMENT = const(0x02)
+_HEAD = const(4)
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from muros.xrce._types import Buffer
+    from muros.xrce.outputs import ReliableOutput
+
+
+class Joiner:
+    """Joins the pieces of one submessage; at most ``limit`` bytes are kept, a longer one is passed over whole."""
+
+    def __init__(self, limit: int) -> None:
+        self.limit = limit
+        self.data = bytearray()
+        self.whole = False
+        self.at = 0  # where handling goes on in data
+        self.too_long = 0  # bytes of a submessage that is being passed over
+
+    def add(self, buf: "Buffer", off: int, n: int, last: int) -> bool:
+        """Takes a piece; whether ``data`` is now a whole submessage."""
+        if self.whole:
+            return True  # asked again about the same last piece
+        if self.too_long or len(self.data) + n > self.limit:
+            self.too_long += len(self.data) + n
+            self.data = bytearray()
+        else:
+            self.data += memoryview(buf)[off : off + n]
+            self.whole = bool(last)
+        return self.whole
+
+    def clear(self) -> None:
+        """Ready for the next submessage."""
+        self.data = bytearray()
+        self.whole = False
+        self.at = 0
+        self.too_long = 0
+
+
+class Cutter:
+    """One large submessage on its way through a reliable output stream, as fast as acknowledgements make room."""
+
+    def __init__(self, data: "bytes | bytearray") -> None:
+        self.data = data
+        self.done = 0
+
+    def pump(self, stream: "ReliableOutput") -> bool:
+        """Puts as many pieces into ``stream`` as it has room for; whether the last one is in."""
+        total = len(self.data)
+        while self.done < total:
+            n = stream.capacity()
+            if n > total - self.done:
+                n = total - self.done
+            at = stream.reserve(n)
+            if at < 0:
+                return False
+            buf = stream.buf
+            buf[at] = _FRAGMENT
+            buf[at + 1] = _LITTLE_ENDIAN if self.done + n < total else _LITTLE_ENDIAN | _LAST_FRAGMENT
+            buf[at + 2] = n & 255
+            buf[at + 3] = n >> 8
+            copy(buf, at + _HEAD, self.data, self.done, n)
+            self.done += n
+        return True

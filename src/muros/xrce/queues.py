@@ -1,0 +1,158 @@
+"""The reliable streams of a host with many sessions: messages are bytes, held only while they wait.
+
+Same rules and numbers as in ``outputs`` and ``inputs``; a session that is idle holds nothing. A sender may be given more than its
+window: the rest waits in order, so that nothing accepted is lost.
+"""
+
+from collections import deque
+
+from muros.xrce._types import Buffer, Send
+from muros.xrce.inputs import ReliableInput
+from muros.xrce.outputs import BestEffortOutput, ReliableOutput
+
+_FRAGMENT = 13
+_LITTLE_ENDIAN = 0x01
+_LAST_FRAGMENT = 0x02
+
+
+class QueuedBestEffortOutput(BestEffortOutput):
+    """Sends each submessage at once, in a message of its own."""
+
+    def post(self, submessage: bytes, send: Send, now: int) -> bool:
+        """Sends ``submessage`` (header and payload); False when it does not fit the MTU."""
+        head = self._head
+        n = len(head) + len(submessage)
+        if n > self.mtu:
+            return False
+        number = self.next
+        self.next = number + 1 & 0xFFFF
+        send(bytes((head[0], self.stream_id, number & 255, number >> 8)) + head[4:] + submessage, 0, n)
+        return True
+
+    def _make(self, mtu: int) -> None:
+        self.buf = bytearray()
+
+
+class QueuedReliableOutput(ReliableOutput):
+    """Keeps messages until they are acknowledged, ``history`` of them in flight, the others waiting."""
+
+    def __init__(self, stream_id: int, mtu: int, head: bytearray, history: int, period: int) -> None:
+        super().__init__(stream_id, mtu, head, history, period)
+        self._kept: deque[bytes] | None = None
+        self._waiting: deque[bytes] | None = None
+
+    def post(self, submessage: bytes, send: Send, now: int) -> bool:
+        """Takes a submessage (header and payload), cut into FRAGMENTs where it does not fit a message."""
+        room = self.mtu - len(self._head)
+        if len(submessage) <= room:
+            self._append(submessage, send, now)
+            return True
+        room -= 4
+        total = len(submessage)
+        for start in range(0, total, room):
+            piece = submessage[start : start + room]
+            flags = _LITTLE_ENDIAN | (_LAST_FRAGMENT if start + room >= total else 0)
+            self._append(bytes((_FRAGMENT, flags, len(piece) & 255, len(piece) >> 8)) + piece, send, now)
+        return True
+
+    def free(self) -> int:
+        """How many messages can be posted without waiting."""
+        return 0 if self._waiting else self.history - (self.next - self.first & 0xFFFF)
+
+    def waiting(self) -> int:
+        """Messages behind the window."""
+        return len(self._waiting) if self._waiting else 0
+
+    def acknowledge(self, first: int, bitmap: int, send: Send, now: int) -> bool:
+        """As in ``ReliableOutput``; what waits moves into the room that was made."""
+        known = super().acknowledge(first, bitmap, send, now)
+        waiting = self._waiting
+        if waiting:
+            while waiting and (self.next - self.first & 0xFFFF) < self.history:
+                self._launch(waiting.popleft(), send, now)
+            if not waiting:
+                self._waiting = None
+        return known
+
+    def reset(self) -> None:
+        """Begins again with number 0; every kept or waiting message is dropped."""
+        super().reset()
+        self._kept = self._waiting = None
+
+    def _make(self, mtu: int) -> None:
+        self.buf = bytearray()
+
+    def _append(self, submessage: bytes, send: Send, now: int) -> None:
+        if self._waiting or (self.next - self.first & 0xFFFF) >= self.history:
+            if self._waiting is None:
+                self._waiting = deque()
+            self._waiting.append(submessage)
+        else:
+            self._launch(submessage, send, now)
+
+    def _launch(self, submessage: bytes, send: Send, now: int) -> None:
+        head = self._head
+        number = self.next
+        message = bytes((head[0], self.stream_id, number & 255, number >> 8)) + head[4:] + submessage
+        if self._kept is None:
+            self._kept = deque()
+        self._kept.append(message)
+        if number == self.first:
+            self.due = now + self.period
+        self.next = self.sent = number + 1 & 0xFFFF
+        send(message, 0, len(message))
+
+    def _transmit(self, number: int, send: Send) -> None:
+        if self._kept is not None:
+            message = self._kept[number - self.first & 0xFFFF]
+            send(message, 0, len(message))
+
+    def _release(self, count: int) -> None:
+        kept = self._kept
+        if kept is None:
+            return
+        if count >= len(kept):
+            self._kept = None
+        else:
+            for _ in range(count):
+                kept.popleft()
+
+
+class QueuedReliableInput(ReliableInput):
+    """Keeps early messages as bytes, of any length up to ``mtu``."""
+
+    def store(self, number: int, buf: Buffer, off: int, n: int) -> None:
+        """Keeps a message that came early, or the expected one while it is held."""
+        self._early[number] = bytes(buf[off : off + n])
+        self.stored |= 1 << (number - self.expected & 0xFFFF)
+
+    def ready(self) -> bool:
+        """Whether the expected message is kept: then it is ``buf[base:base + size]``."""
+        if not self.stored & 1:
+            return False
+        self.buf = self._early[self.expected]
+        self.size = len(self.buf)
+        return True
+
+    def advance(self) -> bool:
+        """The expected message is handled. Whether the next one is kept."""
+        if self._early:
+            self._early.pop(self.expected, None)
+        return super().advance()
+
+    def announce(self, first: int, last: int) -> None:
+        """As in ``ReliableInput``; what was kept before ``first`` is dropped."""
+        super().announce(first, last)
+        for number in [n for n in self._early if not self.stored >> (n - self.expected & 0xFFFF) & 1]:
+            del self._early[number]
+
+    def reset(self) -> None:
+        """Expects number 0 again; kept messages are dropped."""
+        super().reset()
+        self._early.clear()
+
+    def _make(self, mtu: int, window: int) -> None:
+        self._early: dict[int, bytes] = {}
+        self.buf = b""
+        self.base = 0
+        self.size = 0
