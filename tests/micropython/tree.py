@@ -19,8 +19,11 @@ BOARD_FLOOR = ("compat.py", "cdr.py", "xrce", "client", "rclc")
 
 HOST_ONLY = frozenset(
     {
+        "muros/xrce/_crc.py",
+        "muros/xrce/_types.py",
         "muros/xrce/constants.py",
         "muros/xrce/framing.py",
+        "muros/xrce/queues.py",
         "muros/xrce/representation.py",
     }
 )
