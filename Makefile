@@ -6,7 +6,7 @@ BIN := .venv/bin
 PYTEST_ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test lint unit format coverage demo bench docs-check changelog build clean distclean
+.PHONY: help setup test lint unit format coverage demo bench budgets docs-check changelog build clean distclean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -35,6 +35,9 @@ demo: setup ## A board, an agent and the space talking to each other, in one ter
 
 bench: setup ## Every benchmark in bench/
 	@for script in bench/bench_*.py; do echo "== $$script" && $(BIN)/python "$$script" || exit 1; done
+
+budgets: setup ## What the board floor costs in heap, flash and instructions, beside its budgets
+	@$(BIN)/python tools/budgets.py
 
 docs-check: setup ## Links inside the documentation, and that each changelog fragment is well-formed
 	@$(BIN)/pytest -q tests/test_documents.py

@@ -27,6 +27,7 @@ def fuel(tree: Mapping[str, bytes], program: str) -> int:
     engine, module = _runtime()
     with TemporaryDirectory() as name:
         folder = Path(name)
+        (folder / "lib").mkdir()
         write(tree, folder / "lib")
         output = folder / "output"
         wasi = wasmtime.WasiConfig()

@@ -1,0 +1,25 @@
+"""Prints what the board floor costs today, beside what it may cost. Usage: make budgets"""
+
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from tests.micropython.budgets import BUDGETS  # noqa: E402
+
+
+def main() -> int:
+    """Exit status 1 when a row is over its budget."""
+    over = 0
+    print(f"{'what':<60} {'today':>10} {'budget':>10}")
+    for budget in BUDGETS:
+        figure = budget.measure()
+        mark = "" if figure <= budget.limit else "  OVER"
+        over += bool(mark)
+        print(f"{budget.what:<60} {figure:>10,.0f} {budget.limit:>10,.0f} {budget.unit}{mark}")
+    return 1 if over else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
