@@ -1,0 +1,190 @@
+"""The door of the room: what every link promises, and what it tells its owner.
+
+A link moves whole messages between this host and peers. An *address* names a peer of one link: hashable, cheap to
+make, meaningful to that link only (``link.describe(address)`` says it for people). The owner, an agent or a server,
+hands in a `LinkEvents` when it opens the link; all calls, in both directions, happen on the thread of the asyncio
+loop that ran at that moment. No link blocks the loop and none waits for a slow peer: what cannot be sent soon is
+dropped, counted in `LinkCounters.dropped` and told through `LinkEvents.on_problem`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from typing import ClassVar, NamedTuple, Protocol, TypeAlias
+
+Address: TypeAlias = Hashable
+"""A peer of one link. (link, address) is unique among all links."""
+
+
+class LinkError(Exception):
+    """A link cannot be opened as asked: one readable line that says where, why and what to do.
+
+    A local error: nothing a peer sends can cause it.
+    """
+
+    def __init__(self, where: str, why: str, remedy: str) -> None:
+        super().__init__(f"{where}: {why}. {remedy}")
+        self.where = where
+        self.why = why
+        self.remedy = remedy
+
+
+class LinkEvents(Protocol):
+    """What a link tells its owner, always from the loop's thread. A handler may call the link, also `close` it."""
+
+    def on_message(self, link: Link, data: bytes, address: Address) -> None:
+        """A whole message came. ``data`` is the receiver's to keep."""
+
+    def on_up(self, link: Link, detail: str) -> None:
+        """The link, or the port of it that ``detail`` names, has become usable."""
+
+    def on_down(self, link: Link, reason: str) -> None:
+        """The link or a port of it has gone, as ``reason`` says; the link tries by itself to get it back."""
+
+    def on_gone(self, link: Link, address: Address, reason: str) -> None:
+        """This peer cannot be reached any more: its connection closed, or the port it sat on went away."""
+
+    def on_problem(self, link: Link, code: str, what: str, why: str, remedy: str, n: int) -> None:
+        """Something was dropped, refused or does not work, ``n`` times. ``code`` is a stable slug for counting."""
+
+
+class Cause(NamedTuple):
+    """Why messages are dropped: a slug for counters, the reason in words, and what to do about it."""
+
+    code: str
+    why: str
+    remedy: str
+
+
+CLOSED = Cause("link-closed", "the link is not open", "Open the link first.")
+NO_PEER = Cause("no-such-peer", "no such peer is connected", "Nothing: the peer comes back by itself.")
+PORT_GONE = Cause("port-gone", "its port is not there", "Plug the device in again.")
+QUEUE_FULL = Cause(
+    "queue-full",
+    "the peer or its line takes data more slowly than it is sent",
+    "Send less or less often, use a faster line, or enlarge queue_bytes of the link.",
+)
+NETWORK = Cause("network-refused", "the network refused it", "Check the route and the firewall to the peer.")
+EMPTY = Cause("empty-message", "a message of 0 B says nothing", "Check what else sends to this link.")
+
+
+@dataclass(slots=True)
+class LinkCounters:
+    """What has passed through a link since it was made. Bytes are those of messages, without framing."""
+
+    received: int = 0
+    received_bytes: int = 0
+    sent: int = 0
+    """Messages handed to the system or to the link's own queue."""
+    sent_bytes: int = 0
+    dropped: Counter[str] = field(default_factory=Counter)
+    """Messages lost at this host, by the code of their `Cause`."""
+    framing: Counter[str] = field(default_factory=Counter)
+    """Damage seen in byte streams: bad frames by kind, and bytes outside frames as ``garbage``."""
+
+
+class Link(ABC):
+    """A transport that moves whole messages. Made closed; `open` and `close` may alternate.
+
+    ``mtu`` is the longest message in bytes. ``discovery_only`` marks a link on which only GET_INFO is answered.
+    """
+
+    kind: ClassVar[str] = "link"
+    mtu: int = 65535
+    discovery_only: bool = False
+
+    def __init__(self) -> None:
+        self.counters = LinkCounters()
+        self._events: LinkEvents | None = None
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """The link in words: ``udp4 0.0.0.0:8888``, ``serial /dev/ttyUSB0 at 921600``."""
+
+    @property
+    def is_open(self) -> bool:
+        """Between `open` and `close`; a port of the link may be away all the same."""
+        return self._events is not None
+
+    def open(self, events: LinkEvents) -> None:
+        """Starts moving messages; an asyncio loop must be running. Raises `LinkError`, and is closed then."""
+        if self._events is not None:
+            raise LinkError(self.name, "is open already", "Close it first.")
+        self._events = events
+        try:
+            self._open()
+        except BaseException:
+            self.close()
+            raise
+
+    def close(self) -> None:
+        """Stops at once and frees what `open` took; no event comes after this. Closing twice is harmless."""
+        self._events = None
+        self._close()
+
+    @abstractmethod
+    def send(self, message: bytes, address: Address) -> bool:
+        """Sends one whole message. False: dropped, counted and told; never raises for what a network or peer does."""
+
+    def describe(self, address: Address) -> str:
+        """The address for people: ``192.168.1.23:50210``, ``/dev/ttyUSB0#1``."""
+        return str(address)
+
+    def locators(self) -> list[Locator]:
+        """Where peers in the network reach this link, for discovery answers; empty for links without a network."""
+        return []
+
+    @abstractmethod
+    def _open(self) -> None: ...
+
+    @abstractmethod
+    def _close(self) -> None: ...
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name}{'' if self.is_open else ', closed'}>"
+
+    def _deliver(self, message: bytes, address: Address) -> None:
+        events = self._events
+        if events is None:
+            return
+        if not message:
+            self._dropped_incoming(EMPTY, address)
+            return
+        counters = self.counters
+        counters.received += 1
+        counters.received_bytes += len(message)
+        events.on_message(self, message, address)
+
+    def _drop(self, cause: Cause, size: int, address: Address, n: int = 1) -> bool:
+        """Counts and tells ``n`` messages that are not sent; answers False for `send` to return."""
+        self.counters.dropped[cause.code] += n
+        self._problem(cause, f"message of {size} B to {self.describe(address)} not sent", n)
+        return False
+
+    def _drop_too_long(self, size: int, address: Address) -> bool:
+        why = f"this link carries at most {self.mtu} B in a message"
+        return self._drop(
+            Cause("message-too-long", why, "Use a reliable stream, which fragments."), size, address
+        )
+
+    def _dropped_incoming(self, cause: Cause, address: Address) -> None:
+        self.counters.dropped[cause.code] += 1
+        self._problem(cause, f"a message from {self.describe(address)} ignored")
+
+    def _problem(self, cause: Cause, what: str, n: int = 1) -> None:
+        if self._events is not None:
+            self._events.on_problem(self, cause.code, what, cause.why, cause.remedy, n)
+
+
+class Locator(NamedTuple):
+    """Where a link can be reached: an address of this host and a port."""
+
+    family: int
+    """4 or 6."""
+    packed: bytes
+    """The address, 4 or 16 bytes in network order."""
+    port: int

@@ -1,0 +1,123 @@
+"""What links over lines share: ports with framing, several clients told apart by the address byte of their frames."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import NamedTuple
+
+from muros.links._door import CLOSED, PORT_GONE, QUEUE_FULL, Address, Cause, Link
+from muros.links._framing import MESSAGE_BYTES, MakeFraming
+from muros.links._stream import Channel
+
+QUEUE_BYTES = 16 * 1024
+"""Bytes that may wait for a line beyond the kernel's few kB: 1.4 s at 115200 baud."""
+GARBAGE_BYTES = 4096
+"""So many bytes without one good frame make a finding."""
+
+_DAMAGE = ("bad-crc", "bad-length", "cut")
+
+
+class LineAddress(NamedTuple):
+    """A client on a serial line: the device, and the address byte in its frames."""
+
+    device: str
+    peer: int
+
+
+class LineLink(Link):
+    """A link of one or more ports by device name. Subclasses open the ports and are told when one ends."""
+
+    mtu = MESSAGE_BYTES
+
+    def __init__(self, queue_bytes: int, make_framing: MakeFraming) -> None:
+        super().__init__()
+        self.queue_bytes = queue_bytes
+        self.make_framing = make_framing
+        self._ports: dict[str, Port] = {}
+
+    @property
+    def ports(self) -> list[str]:
+        """The devices that are open now."""
+        return list(self._ports)
+
+    def describe(self, address: Address) -> str:
+        return f"{address.device}#{address.peer}" if isinstance(address, LineAddress) else str(address)
+
+    def send(self, message: bytes, address: Address) -> bool:
+        port = self._ports.get(address.device) if isinstance(address, LineAddress) else None
+        if port is None or not isinstance(address, LineAddress):
+            return self._drop(PORT_GONE if self.is_open else CLOSED, len(message), address)
+        if len(message) > self.mtu:
+            return self._drop_too_long(len(message), address)
+        if not port.channel.send(message, address.peer):
+            return self._drop(QUEUE_FULL, len(message), address)
+        counters = self.counters
+        counters.sent += 1
+        counters.sent_bytes += len(message)
+        return True
+
+    def _close(self) -> None:
+        for port in self._ports.values():
+            port.shut()
+        self._ports.clear()
+
+    def _noise_remedy(self) -> str:
+        return "Check what the far end sends: frames of DDS-XRCE for serial lines are expected."
+
+    def _messages(self, port: Port, messages: list[tuple[bytes, int]]) -> None:
+        port.garbage = 0
+        for message, peer in messages:
+            address = port.addresses.get(peer)
+            if address is None:
+                address = port.addresses[peer] = LineAddress(port.device, peer)
+            self._deliver(message, address)
+
+    def _damaged(self, port: Port, errors: dict[str, int]) -> None:
+        self.counters.framing.update(errors)
+        n = sum(errors.get(kind, 0) for kind in _DAMAGE)
+        if n:
+            kinds = ", ".join(f"{errors[kind]} {kind}" for kind in _DAMAGE if kind in errors)
+            cause = Cause("line-noise", f"line noise or wrong baud rate ({kinds})", self._noise_remedy())
+            self._problem(cause, f"bad frames on {port.device} dropped", n)
+        port.garbage += errors.get("garbage", 0)
+        if port.garbage >= GARBAGE_BYTES:
+            why = "wrong baud rate, or the far end writes something else there"
+            what = f"{port.garbage} B without one good frame on {port.device}"
+            port.garbage = 0
+            self._problem(Cause("line-garbage", why, self._noise_remedy()), what)
+
+    def _ended(self, port: Port, reason: str) -> None:
+        """The port has ended by itself."""
+        del self._ports[port.device]
+        port.shut()
+        for address in port.addresses.values():
+            if self._events is not None:
+                self._events.on_gone(self, address, reason)
+        if self._events is not None:
+            self._events.on_down(self, reason)
+
+
+class Port:
+    """An open line: its descriptor, its channel, and the clients heard on it. ``close(fd)`` gives it back."""
+
+    def __init__(self, link: LineLink, device: str, fd: int, close: Callable[[int], None]) -> None:
+        self.device = device
+        self.real_path = os.path.realpath(device)
+        self.addresses: dict[int, LineAddress] = {}
+        self.garbage = 0
+        self._fd = fd
+        self._close = close
+        self.channel = Channel(
+            fd,
+            link.make_framing(),
+            link.queue_bytes,
+            lambda _, messages: link._messages(self, messages),
+            lambda _, errors: link._damaged(self, errors),
+            lambda _, reason: link._ended(self, reason),
+        )
+
+    def shut(self) -> None:
+        """Ends the line at once and in silence."""
+        self.channel.stop()
+        self._close(self._fd)

@@ -1,0 +1,160 @@
+"""A byte stream on a file descriptor, driven by the loop's readiness: serial lines, TCP connections, ptys.
+
+Two layers. `ByteStream` moves bytes: it reads at most one buffer a wake-up, so that streams take turns, and it
+writes at once what the system takes and keeps the rest, whole frames only, up to a limit. `Channel` adds the
+framing and speaks in messages. Neither owns the descriptor: who opened it closes it, after `stop`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from muros.links._framing import Framing
+
+READ_BYTES = 65536
+"""Most bytes read from a stream in one wake-up."""
+
+
+class ByteStream:
+    """Reads and writes a non-blocking descriptor.
+
+    ``on_bytes(data)`` gets what comes; ``on_end(reason)`` is called once when the stream has ended, never from
+    within `write`. ``queue_bytes`` bounds what waits for a slow far end, yet an empty queue takes a frame of any
+    size.
+    """
+
+    def __init__(
+        self,
+        fd: int,
+        queue_bytes: int,
+        on_bytes: Callable[[bytes], None],
+        on_end: Callable[[str], None],
+    ) -> None:
+        self._fd = fd
+        self._limit = queue_bytes
+        self._on_bytes = on_bytes
+        self._on_end = on_end
+        self._queue = bytearray()
+        self._running = True
+        self._loop = asyncio.get_running_loop()
+        self._loop.add_reader(fd, self._readable)
+
+    @property
+    def queued(self) -> int:
+        """Bytes that wait for the far end to take them."""
+        return len(self._queue)
+
+    def write(self, frame: bytes) -> bool:
+        """Sends or queues the whole frame; False when the queue has no room for it or the stream has ended."""
+        queue = self._queue
+        if queue:
+            if len(queue) + len(frame) > self._limit:
+                return False
+            queue += frame
+            return True
+        if not self._running:
+            return False
+        try:
+            done = os.write(self._fd, frame)
+        except (BlockingIOError, InterruptedError):
+            done = 0
+        except OSError as error:
+            self._loop.call_soon(self._end, error.strerror or str(error))
+            return False
+        if done < len(frame):
+            queue += memoryview(frame)[done:]
+            self._loop.add_writer(self._fd, self._writable)
+        return True
+
+    def stop(self) -> None:
+        """Ends without a call of ``on_end``; what is queued is lost."""
+        if self._running:
+            self._running = False
+            self._loop.remove_reader(self._fd)
+            self._loop.remove_writer(self._fd)
+            self._queue.clear()
+
+    def _readable(self) -> None:
+        try:
+            data = os.read(self._fd, READ_BYTES)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as error:
+            self._end(error.strerror or str(error))
+            return
+        if data:
+            self._on_bytes(data)
+        else:
+            self._end("closed by the far end")
+
+    def _writable(self) -> None:
+        queue = self._queue
+        try:
+            done = os.write(self._fd, queue)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as error:
+            self._end(error.strerror or str(error))
+            return
+        del queue[:done]
+        if not queue:
+            self._loop.remove_writer(self._fd)
+
+    def _end(self, reason: str) -> None:
+        if self._running:
+            self.stop()
+            self._on_end(reason)
+
+
+class Channel:
+    """A byte stream that carries messages.
+
+    ``on_messages(channel, messages)`` gets each batch of (message, peer number); ``on_damage(channel, errors)`` the
+    kinds and numbers of framing errors that a read has shown; ``on_end(channel, reason)`` ends it.
+    """
+
+    def __init__(
+        self,
+        fd: int,
+        framing: Framing,
+        queue_bytes: int,
+        on_messages: Callable[[Channel, list[tuple[bytes, int]]], None],
+        on_damage: Callable[[Channel, dict[str, int]], None],
+        on_end: Callable[[Channel, str], None],
+    ) -> None:
+        self.framing = framing
+        self._on_messages = on_messages
+        self._on_damage = on_damage
+        self._on_end = on_end
+        self._seen = dict(framing.errors())
+        self._stream = ByteStream(fd, queue_bytes, self._take, self._end)
+
+    @property
+    def queued(self) -> int:
+        """Bytes that wait for the far end to take them."""
+        return self._stream.queued
+
+    def send(self, message: bytes, peer: int) -> bool:
+        """Sends or queues one message; False when there is no room for it."""
+        return self._stream.write(self.framing.frame(message, peer))
+
+    def stop(self) -> None:
+        """Ends in silence."""
+        self._stream.stop()
+
+    def _take(self, data: bytes) -> None:
+        messages = self.framing.feed_untrusted(data)
+        errors = self.framing.errors()
+        if errors != self._seen:
+            fresh = {kind: n - self._seen.get(kind, 0) for kind, n in errors.items()}
+            self._seen = dict(errors)
+            self._on_damage(self, {kind: n for kind, n in fresh.items() if n})
+        if messages:
+            self._on_messages(self, messages)
+
+    def _end(self, reason: str) -> None:
+        self._on_end(self, reason)
