@@ -14,12 +14,15 @@ help: ## List the targets
 setup: ## Create .venv and install everything the checks need (quick when nothing changed)
 	@tools/setup.sh
 
-test: lint unit ## Everything: lint, types, layers, all tests on CPython and MicroPython
+test: setup ## Everything: lint, types, layers, all tests on CPython and MicroPython
+	@failed=; for part in lint unit; do $(MAKE) --no-print-directory $$part || failed+=" $$part"; done; \
+	if [ "$$failed" ]; then echo "make test: failed in:$$failed" >&2; exit 1; fi
 
 lint: setup ## Style, formatting, types and the order of the rooms
-	@echo "== ruff" && $(BIN)/ruff check --quiet . && $(BIN)/ruff format --quiet --check .
-	@echo "== mypy --strict" && $(BIN)/mypy --no-error-summary
-	@echo "== import-linter" && $(BIN)/lint-imports --no-logo | tail -n +6
+	@failed=; run() { echo "== $$*"; $(BIN)/"$$@" || failed=1; }; \
+	run ruff check --quiet --output-format concise .; \
+	run ruff format --quiet --check --output-format concise .; run mypy --no-error-summary; \
+	run lint-imports --no-logo; test -z "$$failed"
 
 unit: setup ## All tests (PYTEST_ARGS="tests/xrce -k stream" chooses)
 	@echo "== pytest" && $(BIN)/pytest $(PYTEST_ARGS)

@@ -37,29 +37,21 @@ ELSEWHERE = {
 }
 """What single modules may import besides: the platform in ``compat``, native code, and the transports."""
 
-# fmt: off
-ABSENT_NAMES = frozenset({
-    "BlockingIOError", "BrokenPipeError", "BufferError", "ChildProcessError",
-    "ConnectionAbortedError", "ConnectionError", "ConnectionRefusedError",
-    "ConnectionResetError", "EnvironmentError", "ExceptionGroup", "FileExistsError",
-    "FileNotFoundError", "FloatingPointError", "IOError", "InterruptedError",
-    "IsADirectoryError", "ModuleNotFoundError", "NotADirectoryError", "PermissionError",
-    "ProcessLookupError", "RecursionError", "ReferenceError", "SystemError", "TimeoutError",
-    "UnboundLocalError", "UnicodeDecodeError", "UnicodeEncodeError", "Warning", "UserWarning",
-    "DeprecationWarning", "RuntimeWarning", "aiter", "anext", "ascii", "breakpoint", "format",
-    "vars",
-})
-# fmt: on
+ABSENT_NAMES = frozenset(
+    "BlockingIOError BrokenPipeError BufferError ChildProcessError ConnectionAbortedError "
+    "ConnectionError ConnectionRefusedError ConnectionResetError EnvironmentError ExceptionGroup "
+    "FileExistsError FileNotFoundError FloatingPointError IOError InterruptedError IsADirectoryError "
+    "ModuleNotFoundError NotADirectoryError PermissionError ProcessLookupError RecursionError "
+    "ReferenceError SystemError TimeoutError UnboundLocalError UnicodeDecodeError UnicodeEncodeError "
+    "Warning UserWarning DeprecationWarning RuntimeWarning aiter anext ascii breakpoint format vars".split()
+)
 """Builtins that MicroPython lacks."""
 
-# fmt: off
-ABSENT_METHODS = frozenset({
-    "bit_count", "bit_length", "capitalize", "casefold", "expandtabs", "format_map",
-    "frombytes", "is_integer", "isalnum", "isascii", "isidentifier", "isnumeric", "isprintable",
-    "iter_unpack", "ljust", "maketrans", "recv_into", "recvfrom_into", "removeprefix",
-    "removesuffix", "rjust", "swapcase", "titlecase", "tobytes", "toreadonly", "zfill", "Struct",
-})
-# fmt: on
+ABSENT_METHODS = frozenset(
+    "bit_count bit_length capitalize casefold expandtabs format_map frombytes is_integer isalnum "
+    "isascii isidentifier isnumeric isprintable iter_unpack ljust maketrans recv_into recvfrom_into "
+    "removeprefix removesuffix rjust swapcase titlecase tobytes toreadonly zfill Struct".split()
+)
 """Methods that MicroPython's strings, numbers, buffers and sockets lack."""
 
 ABSENT_SYNTAX: dict[str, str] = {

@@ -17,12 +17,10 @@ import muros
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
-# fmt: off
-HEAVY = frozenset({
-    "apsw", "asyncio", "importlib.metadata", "logging", "lz4", "multiprocessing", "numpy", "rosbags", "ruamel",
-    "serial", "socket", "sqlite3", "ssl", "typing", "unittest", "xml", "zstandard",
-})
-# fmt: on
+HEAVY = frozenset(
+    "apsw asyncio importlib.metadata logging lz4 multiprocessing numpy rosbags ruamel serial socket "
+    "sqlite3 ssl typing unittest xml zstandard".split()
+)
 """Modules that `import muros` must not load; `muros --version` may use what argparse needs besides."""
 
 

