@@ -1,0 +1,102 @@
+"""Who meets whom on one topic, and what is said when two do not fit."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from muros.space._graph import Incompatible, Matched, Unmatched
+from muros.space._qos import Mismatch, mismatches
+from muros.space.local._core import Core
+from muros.space.local._endpoint import LocalEndpoint
+from muros.space.local._reader import LocalReader
+from muros.space.local._writer import LocalWriter
+
+__all__ = ["TopicRecord", "reasons_against"]
+
+
+class TopicRecord:
+    """The writers and readers of one topic name in one domain. The tuples are replaced, never changed."""
+
+    __slots__ = ("name", "readers", "writers")
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.writers: tuple[LocalWriter, ...] = ()
+        self.readers: tuple[LocalReader, ...] = ()
+
+    def join(self, endpoint: LocalEndpoint) -> None:
+        """`endpoint` comes: it meets everybody on the other side."""
+        if isinstance(endpoint, LocalWriter):
+            self.writers += (endpoint,)
+            for reader in self.readers:
+                _meet(endpoint, reader)
+        elif isinstance(endpoint, LocalReader):
+            self.readers += (endpoint,)
+            for writer in self.writers:
+                _meet(writer, endpoint)
+
+    def leave(self, endpoint: LocalEndpoint) -> None:
+        """`endpoint` goes: those it was matched with lose it."""
+        core = endpoint.core
+        if isinstance(endpoint, LocalWriter):
+            self.writers = tuple(writer for writer in self.writers if writer is not endpoint)
+            for reader in endpoint.all_readers():
+                endpoint.disconnect(reader)
+                _tell_unmatched(core, endpoint, reader)
+        elif isinstance(endpoint, LocalReader):
+            self.readers = tuple(reader for reader in self.readers if reader is not endpoint)
+            for writer in self.writers:
+                if writer.reaches(endpoint):
+                    writer.disconnect(endpoint)
+                    _tell_unmatched(core, writer, endpoint)
+
+    @property
+    def empty(self) -> bool:
+        """Whether nobody is left."""
+        return not self.writers and not self.readers
+
+
+def reasons_against(writer: LocalWriter, reader: LocalReader) -> tuple[Mismatch, ...]:
+    """Why the two do not fit; empty if they do."""
+    if writer.topic.type_name != reader.topic.type_name:
+        return (
+            Mismatch(
+                "type",
+                f"type {writer.topic.type_name}",
+                f"type {reader.topic.type_name}",
+                "Use one type for one topic, or another topic name",
+            ),
+        )
+    return mismatches(writer.qos, reader.qos)
+
+
+def _meet(writer: LocalWriter, reader: LocalReader) -> None:
+    core = writer.core
+    reasons = reasons_against(writer, reader)
+    if reasons:
+        core.notices.append(partial(_report_mismatch, writer, reader, reasons))
+        if core.watchers:
+            core.tell(Incompatible(writer.info(), reader.info(), tuple(str(reason) for reason in reasons)))
+        return
+    writer.connect(reader)
+    if core.watchers:
+        core.tell(Matched(writer.info(), reader.info()))
+
+
+def _tell_unmatched(core: Core, writer: LocalWriter, reader: LocalReader) -> None:
+    if reader.deadline is not None and reader.idle:
+        reader.deadline.stop()
+    if core.watchers:
+        core.tell(Unmatched(writer.info(), reader.info()))
+
+
+def _report_mismatch(writer: LocalWriter, reader: LocalReader, reasons: tuple[Mismatch, ...]) -> None:
+    topic = reader.topic.name
+    writer.core.report(
+        "type-mismatch" if reasons[0].policy == "type" else "qos-mismatch",
+        who=reader.owner,
+        subject=topic,
+        what=f"{reader.owner} gets no {topic} from {writer.owner}",
+        why="; ".join(str(reason) for reason in reasons),
+        remedy="; ".join(reason.remedy for reason in reasons),
+    )

@@ -1,0 +1,109 @@
+"""The local space: in process, nothing to install, everything delivered in the writer's call."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Callable
+
+from muros.findings import Findings
+from muros.space._door import ClosedError, SpaceError
+from muros.space.local._core import Core, Limits
+from muros.space.local._endpoint import Closing
+from muros.space.local._participant import Domain, LocalParticipant, prefixes
+from muros.space.local._view import LocalGraph
+
+__all__ = ["LocalSpace", "open_local"]
+
+
+class LocalSpace(Closing):
+    """A space of one process. See `muros.space.Space`."""
+
+    def __init__(
+        self,
+        *,
+        domain: int = 0,
+        findings: Findings | None = None,
+        clock: Callable[[], int] = time.time_ns,
+        limits: Limits | None = None,
+    ) -> None:
+        self.domain = domain
+        self.url = f"local:{domain}" if domain else "local:"
+        self.findings = Findings() if findings is None else findings
+        self.clock = clock
+        self.closed = False
+        self._core = Core(clock, self.findings, limits or Limits())
+        self._domains: dict[int, Domain] = {}
+        self._next_prefix = prefixes(os.urandom(8))
+        self.graph = LocalGraph(self._core, self._domains)
+
+    @property
+    def limits(self) -> Limits:
+        """The bounds it keeps."""
+        return self._core.limits
+
+    def participant(
+        self,
+        name: str,
+        *,
+        namespace: str = "/",
+        domain: int | None = None,
+        enclave: str = "/",
+        key: bytes | None = None,
+        owner: str = "",
+    ) -> LocalParticipant:
+        """A new participant."""
+        if self.closed:
+            raise ClosedError("the space is closed; open another one")
+        number = self.domain if domain is None else domain
+        home = self._domains.get(number)
+        if home is None:
+            home = self._domains[number] = Domain(number)
+        prefix = self._next_prefix() if key is None else _prefix_of(key)
+        if (holder := home.participants.get(prefix)) is not None:
+            raise ValueError(f"key {key!r} is in use by {holder.owner}; close it first, or take another key")
+        return LocalParticipant(self._core, home, prefix, name, namespace, enclave, owner)
+
+    def tick(self) -> int | None:
+        """Do what has become due. Returns when to call again, None = when asked to."""
+        return None if self.closed else self._core.tick()
+
+    def on_wake(self, callback: Callable[[], object] | None) -> None:
+        """Call `callback` when `tick` is needed earlier than it said."""
+        self._core.on_wake = callback
+
+    def close(self) -> None:
+        """Close every participant."""
+        if self.closed:
+            return
+        self.closed = True
+        for home in tuple(self._domains.values()):
+            for participant in tuple(home.participants.values()):
+                participant.close()
+        self._domains.clear()
+        self._core.queue.clear()
+
+
+def open_local(
+    rest: str,
+    *,
+    findings: Findings | None = None,
+    clock: Callable[[], int] = time.time_ns,
+    **limits: int,
+) -> LocalSpace:
+    """The engine of `local:` URLs. `rest` is the default domain; limits are the fields of `Limits`."""
+    if rest and not (rest.isascii() and rest.isdigit()):
+        raise SpaceError(f"local:{rest}: {rest!r} is no domain number; write local: or local:42")
+    unknown = sorted(set(limits) - set(Limits.__dataclass_fields__))
+    if unknown:
+        known = ", ".join(Limits.__dataclass_fields__)
+        raise TypeError(f"local: has no option {', '.join(unknown)} (known: {known})")
+    return LocalSpace(domain=int(rest or 0), findings=findings, clock=clock, limits=Limits(**limits))
+
+
+def _prefix_of(key: bytes) -> bytes:
+    """The 12 bytes of a gid prefix for a participant's key."""
+    if not key:
+        raise ValueError("the key of a participant is empty; leave it out, or give at least one byte")
+    return bytes(key) if len(key) == 12 else hashlib.blake2b(key, digest_size=12).digest()
