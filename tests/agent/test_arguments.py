@@ -162,8 +162,8 @@ def test_the_domain_override() -> None:
         ("udp4 -p 1 -x", "unknown option -x; see muros agent --help"),
         ("udp4 -p 1 --no-color=1", "--no-color takes no value, but '--no-color=1' gives it one"),
         (
-            "udp4 -p 1 tcp5 -p 2",
-            "'tcp5' behind udp4 is neither an option nor a transport (did you mean tcp4?)",
+            "udp4 -p 1 tpc4 -p 2",
+            "'tpc4' behind udp4 is neither an option nor a transport (did you mean tcp4?)",
         ),
         ("udp4 8888", "'8888' behind udp4 is neither an option nor a transport"),
         ("-p 8888 udp4", "-p belongs to a link: put it behind udp4, udp6, tcp4, tcp6"),
