@@ -3,6 +3,7 @@
 `Agent` runs in an asyncio program; `AgentCore` is the same without I/O.
 """
 
+from muros.agent._agent import Agent
 from muros.agent._core import AgentCore, Port
 from muros.agent._limits import Limits
 from muros.agent.events import (
@@ -20,6 +21,7 @@ from muros.agent.events import (
 )
 
 __all__ = [
+    "Agent",
     "AgentCore",
     "ClientBack",
     "ClientConnected",

@@ -59,6 +59,8 @@ _ATTEMPT_MEMORY = 10_000
 _TICK = 50
 """How exactly heartbeats keep their time, in ms."""
 _LIVELINESS_TICK = 200
+_SUMMARY = 1_000
+"""When to look whether findings are to be summarised, in ms after one."""
 _QUIET = 200
 """Silence after the last CREATE until a client counts as ready, in ms."""
 _PROBE = bytes((GET_INFO, 1, 8, 0, 0, 0, 0xFF, 0xFE, 1, 0, 0, 0))
@@ -238,7 +240,7 @@ class AgentCore:
 
     def _heartbeats(self, now: int) -> None:
         dead = self.limits.dead_time
-        for session in [s for s in self.unacknowledged]:
+        for session in list(self.unacknowledged):
             if now - session.heard > dead or session.lost_at is not None:
                 continue
             session.heartbeats(now)

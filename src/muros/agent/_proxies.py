@@ -143,7 +143,7 @@ class GroupProxy(Proxy):
 
     def __init__(self, object_id: int, entity: Entity | None, parent: ParticipantProxy, kind: int) -> None:
         super().__init__(object_id, entity, parent, "publisher" if kind == KIND_PUBLISHER else "subscriber")
-        self.kind = kind  # type: ignore[misc]
+        self.kind = kind
 
 
 class WriterProxy(Proxy):
@@ -225,6 +225,7 @@ class Reading:
         """Sends what can be sent now, and sees to being called again when more can."""
         host = self._host
         output = host.output(self.stream_id)
+        window = output if isinstance(output, QueuedReliableOutput) else None
         while self.remaining and host.reachable:
             now = host.tick
             if self._deadline and now >= self._deadline:
@@ -232,7 +233,7 @@ class Reading:
                 return
             if (self._rate or self._pace) and not self._allowed(now):
                 return
-            if output is not None and output.reliable and output.free() <= 0:
+            if window is not None and window.free() <= 0:
                 host.wait_for_room(self)
                 return
             body = self.take()

@@ -45,7 +45,7 @@ class LinkUp(Event):
 
     def text(self) -> str:
         """One line for people."""
-        return self.detail or f"{self.link} is up"
+        return f"{self.detail or self.link} is up"
 
 
 @dataclass(frozen=True, slots=True)
