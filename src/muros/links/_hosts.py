@@ -82,14 +82,21 @@ def _ipv6_addresses() -> list[InterfaceAddress]:
 def _holder_of(targets: set[str]) -> str | None:
     if not targets:
         return None
-    for process in sorted(Path("/proc").glob("[0-9]*"), key=lambda path: int(path.name)):
+    for process in sorted(int(name) for name in os.listdir("/proc") if name.isdecimal()):
+        folder = f"/proc/{process}/fd"
         try:
-            for descriptor in os.scandir(process / "fd"):
-                if os.readlink(descriptor.path) in targets:
-                    return f"{(process / 'comm').read_text().strip()} (pid {process.name})"
+            if any(_points_to(f"{folder}/{number}", targets) for number in os.listdir(folder)):
+                return f"{Path(f'/proc/{process}/comm').read_text().strip()} (pid {process})"
         except OSError:  # gone meanwhile, or another user's
             continue
     return None
+
+
+def _points_to(link: str, targets: set[str]) -> bool:
+    try:
+        return os.readlink(link) in targets
+    except OSError:
+        return False
 
 
 def _lines(path: Path) -> list[str]:

@@ -5,7 +5,7 @@ owns no clock and needs no asyncio: time is the number given to `SimulatedNetwor
 are in the same). `SimulatedLink` puts a `Link` on such a network, `PairLink` is a link whose peers are plain objects in
 the test, and `Recorder` is a `LinkEvents` that keeps what a link tells.
 
-    network = SimulatedNetwork(seed=7, loss=0.1, delay=(0.001, 0.020))
+    network = SimulatedNetwork(seed=3, loss=0.1, delay=(0.001, 0.020))
     client = network.endpoint("client")
     agent = network.endpoint("agent", lambda data, sender: agent.send(data.upper(), sender))
     client.send(b"hello", "agent")
@@ -56,11 +56,12 @@ class Datagram:
 class SimulatedNetwork:
     """A network of named endpoints on which messages fare badly, the same way for the same seed.
 
-    Each is a probability for every message: ``loss`` that it never arrives, ``duplicate`` that it arrives twice,
-    ``reorder`` that it is held back, so that later ones overtake it. ``delay`` is the least and the most time on the
-    way; the messages from one endpoint to another keep their order except for reordered ones. ``mtu`` in bytes is
-    the longest message taken. The probabilities and the delay may be changed at any time. Every message draws the
-    same number of random values, so that changing one setting leaves the other decisions of a seed alone.
+    Each is a probability for every message: ``loss`` that it never arrives, ``duplicate`` that a second copy
+    arrives, ``reorder`` that it is held back, so that others on the way overtake it. ``delay`` is the least and the
+    most time on the way; the messages from one endpoint to another keep their order except for reordered ones and
+    second copies. ``mtu`` in bytes is the longest message taken. The probabilities and the delay may be changed at
+    any time. Every message draws the same number of random values, so that changing one setting leaves the other
+    decisions of a seed alone.
 
     ``tap``, when set, is asked about every message that would leave: False loses it. `counters` counts messages:
     ``sent``, ``delivered``, and by fate ``lost``, ``duplicated``, ``reordered``, ``tapped``, ``parted`` (by a
@@ -236,7 +237,7 @@ class Endpoint:
         self.on_receive = on_receive
         self.inbox: deque[tuple[bytes, Hashable]] = deque()
 
-    def send(self, data: bytes, receiver: Hashable) -> bool:
+    def send(self, data: bytes | bytearray | memoryview, receiver: Hashable) -> bool:
         """Sends a copy of ``data`` at the network's present time. False when longer than its MTU or closed."""
         if self.network._endpoints.get(self.address) is not self:
             return False
