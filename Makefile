@@ -12,10 +12,10 @@ help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 setup: ## Create .venv and install everything the checks need (quick when nothing changed)
-	@tools/setup.sh
+	@$(if $(READY),,tools/setup.sh)
 
 test: setup ## Everything: lint, types, layers, all tests on CPython and MicroPython
-	@failed=; for part in lint unit; do $(MAKE) --no-print-directory $$part || failed+=" $$part"; done; \
+	@failed=; for part in lint unit; do $(MAKE) --no-print-directory READY=1 $$part || failed+=" $$part"; done; \
 	if [ "$$failed" ]; then echo "make test: failed in:$$failed" >&2; exit 1; fi
 
 lint: setup ## Style, formatting, types and the order of the rooms

@@ -109,9 +109,9 @@ def smallest(
 
 BUDGETS: tuple[Budget, ...] = (
     Budget(
-        "import of compat", 1500, "B", ("mpy-cross", "gauge"), partial(import_heap, "import muros.compat")
+        "import of compat", 2500, "B", ("mpy-cross", "gauge"), partial(import_heap, "import muros.compat")
     ),
-    Budget("bytecode of compat", 1000, "B", ("mpy-cross",), partial(bytecode, ["compat.py"])),
+    Budget("bytecode of compat", 1200, "B", ("mpy-cross",), partial(bytecode, ["compat.py"])),
     *(
         Budget(
             f"allocation of copying 16 B, {bits} bit",
