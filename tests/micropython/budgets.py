@@ -5,6 +5,7 @@
 Measures to build rows from:
 
 - ``import_heap``, ``object_heap``, ``live_heap``: bytes on a 32-bit heap, bytecode in RAM, garbage not counted
+- ``drift``: bytes that the 32-bit heap grows by over many calls
 - ``allocation_32``, ``allocation_64``: bytes of heap that one call allocates, garbage included
 - ``instructions``: exact count for one call (fuel); the limit is the agreed figure plus ten percent
 - ``bytecode``: bytes of ``.mpy``, the flash that a board needs
@@ -63,6 +64,16 @@ def live_heap(setup: str, source: str, extra: Mapping[str, bytes] | None = None)
     New names in ``source`` count too, up to a few hundred bytes.
     """
     return heap_cost(_mpy(extra), source, before=setup)
+
+
+def drift(setup: str, call: str, times: int, extra: Mapping[str, bytes] | None = None) -> float:
+    """Bytes by which ``times`` calls of a statement after ``setup`` raise what lives on a 32-bit heap.
+
+    A tenth as many calls run before, so that buffers which grow once to their size do not count.
+    """
+    loop = f"def _loop(n):\n    for _ in range(n):\n        {call}\n"
+    *_, first, last = run_gauge(_mpy(extra), f"{setup}\n{loop}", f"_loop({times // 10})", f"_loop({times})")
+    return last.live - first.live
 
 
 def allocation_32(setup: str, call: str, extra: Mapping[str, bytes] | None = None) -> float:

@@ -103,6 +103,29 @@ def test_a_program_too_big_for_any_allowed_heap_is_an_error() -> None:
         smallest_heap(lambda heapsize: _run("kept = bytearray(300000)", heapsize), 4, 64)
 
 
+@pytest.mark.parametrize("form", ["py", "mpy"])
+def test_smallest_heap_of_a_program(form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    require("unix")
+    require("mpy-cross")
+    monkeypatch.setattr(budgets, "PROGRAMS", tmp_path)
+    program = tmp_path / "hungry.py"
+    program.write_text("import muros.compat\nkept = bytearray(30000)\nprint('done')\n")
+    assert 30 < budgets.smallest("hungry", form, 40) < 45
+    with pytest.raises(BoardError, match="MemoryError"):
+        budgets.smallest("hungry", form, 10)
+    program.write_text("print('gave up')\n")
+    with pytest.raises(BoardError, match=r"did not finish its work:\ngave up"):
+        budgets.smallest("hungry", form, 40)
+
+
+def test_drift_sees_what_piles_up() -> None:
+    require("gauge")
+    require("mpy-cross")
+    setup = "pile = []\nnumbers = bytearray(4)"
+    assert budgets.drift(setup, "pile.append(bytearray(16))", 100) > 100 * 32
+    assert budgets.drift(setup, "numbers[0] = 1; bytes(20)", 1000) == 0
+
+
 def test_unix_port_passes_arguments(tmp_path: Path) -> None:
     require("unix")
     script = tmp_path / "script.py"
