@@ -175,6 +175,10 @@ def _words(value: IntEnum) -> str:
     return value.name.lower().replace("_", " ")
 
 
+def _period(name: str, ns: int) -> str:
+    return f"a {name} of {duration(ns)}" if ns else f"no {name}"
+
+
 def _often_enough(offered: int, wanted: int) -> bool:
     """A period is offered that is no longer than the wanted one (0 = infinite)."""
     return wanted == NONE or NONE < offered <= wanted
@@ -197,7 +201,7 @@ _RULES: Final = (
     _Rule(
         "deadline",
         lambda offered, wanted: _often_enough(offered.deadline, wanted.deadline),
-        lambda qos: f"a deadline of {duration(qos.deadline)}",
+        lambda qos: _period("deadline", qos.deadline),
         "Give the writer a deadline no longer than the reader's, or the reader none",
     ),
     _Rule(
@@ -209,7 +213,7 @@ _RULES: Final = (
     _Rule(
         "lease",
         lambda offered, wanted: _often_enough(offered.lease, wanted.lease),
-        lambda qos: f"a liveliness lease of {duration(qos.lease)}",
+        lambda qos: _period("liveliness lease", qos.lease),
         "Give the writer a lease no longer than the reader's, or the reader none",
     ),
     _Rule(

@@ -80,6 +80,7 @@ class LocalParticipant(Closing):
     def writer(self, topic: Topic, qos: Qos | None = None, *, key: int | None = None) -> LocalWriter:
         """A new writer."""
         qos = self._settled(qos, "dds_writer", topic.name)
+        self._limit_depth(qos, topic.name, holds=qos.durability != Durability.VOLATILE)
         writer = LocalWriter(self, topic, qos, self._gids(key, WRITER_KIND)[0])
         self._add(writer, writer)
         return writer
@@ -94,6 +95,7 @@ class LocalParticipant(Closing):
     ) -> LocalReader:
         """A new reader."""
         qos = self._settled(qos, "dds_reader", topic.name)
+        self._limit_depth(qos, topic.name)
         reader = LocalReader(self, topic, qos, self._gids(key, READER_KIND)[0], on_data)
         self._add(reader, reader)
         return reader
@@ -109,6 +111,7 @@ class LocalParticipant(Closing):
     ) -> LocalRequester:
         """A new client of a service."""
         qos = self._settled(qos, "services_default", service.name)
+        self._limit_depth(qos, service.name)
         writer_gid, reader_gid = self._gids(key, WRITER_KIND, READER_KIND)
         requester = LocalRequester(self, service, qos, writer_gid, reader_gid, on_reply, on_data)
         self._add(requester, requester.reader, requester.writer)
@@ -125,6 +128,7 @@ class LocalParticipant(Closing):
     ) -> LocalReplier:
         """A new server of a service."""
         qos = self._settled(qos, "services_default", service.name)
+        self._limit_depth(qos, service.name)
         writer_gid, reader_gid = self._gids(key, WRITER_KIND, READER_KIND)
         replier = LocalReplier(self, service, qos, writer_gid, reader_gid, on_request, on_data)
         self._add(replier, replier.writer, replier.reader)
@@ -217,8 +221,12 @@ class LocalParticipant(Closing):
                 severity=Severity.INFO,
             )
             qos = qos.replace(durability=Durability.TRANSIENT_LOCAL)
+        return qos
+
+    def _limit_depth(self, qos: Qos, about: str, *, holds: bool = True) -> None:
+        """Say so when an endpoint that holds samples will hold fewer than it was asked to."""
         limit = self.core.limits.resource_limit
-        if not qos.keeps_all and qos.depth > limit:
+        if holds and not qos.keeps_all and qos.depth > limit:
             self.core.report(
                 "depth-limited",
                 who=self.owner,
@@ -228,7 +236,6 @@ class LocalParticipant(Closing):
                 remedy="Ask for a smaller depth, or give the space a greater resource_limit",
                 severity=Severity.INFO,
             )
-        return qos
 
 
 def prefixes(seed: bytes) -> Callable[[], bytes]:

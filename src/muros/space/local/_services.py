@@ -129,7 +129,7 @@ class LocalRequester(Closing):
         if len(self._waiting) >= writer.limit:
             self._waiting.popleft()
             core.count("request-overwritten", writer.owner, self.service.name, self._tell_overwritten)
-            core.poke()
+            core.drain()
         self._waiting.append((core.timers.now() + core.limits.request_wait, sample))
         if self._timer is None:
             self._schedule()
@@ -251,7 +251,7 @@ class LocalReplier(Closing):
         if writer.deliver(sample):
             return True
         writer.core.count("reply-unmatched", writer.owner, self.service.name, self._tell_unmatched)
-        writer.core.poke()
+        writer.core.drain()
         return False
 
     def close(self) -> None:
