@@ -1,0 +1,139 @@
+"""`muros agent`: reads the command line, opens the links, prints what happens until it is told to stop."""
+
+import asyncio
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+
+from muros import __version__
+from muros.agent import Agent, Event, LinkUp
+from muros.agent.arguments import AgentOptions, LinkOptions, UsageError, help_text, parse_arguments
+from muros.agent.profiles import NamedReferences, Profiles, ProfilesError, ReferenceChain
+from muros.cli._log import DEBUG, STYLES, Log, Message
+from muros.cli._tap import Tap
+from muros.findings import Finding
+from muros.links import (
+    LINK_KINDS,
+    Address,
+    CanLink,
+    DiscoveryLink,
+    Link,
+    LinkError,
+    PseudoterminalLink,
+    SerialLink,
+)
+
+FAILED = 1
+WRONG_USE = 2
+
+
+def run(argv: Sequence[str]) -> int:
+    """Run the agent until SIGINT or SIGTERM; returns the exit status."""
+    try:
+        options = parse_arguments(argv)
+        if options is None:
+            print(help_text())
+            return 0
+        profiles = _profiles(options)
+    except (UsageError, ProfilesError) as error:
+        return _fail(error, WRONG_USE)
+    for note in (*options.notes, *profiles.notes()):
+        _say(f"note: {note}")
+    try:
+        asyncio.run(_serve(options, profiles))
+    except LinkError as error:
+        return _fail(error, FAILED)
+    return 0
+
+
+def make_links(options: AgentOptions) -> Iterator[Link]:
+    """The links that are asked for, closed; one discovery link for each port that is asked for."""
+    discovery: dict[int, Link] = {}
+    for link in options.links:
+        yield _make_link(link)
+        port = link.discovery_port
+        if port is not None and port not in discovery:
+            one = link.bind if link.bind and link.family == 4 and link.bind != "0.0.0.0" else None
+            discovery[port] = DiscoveryLink(port, interface=one)
+    yield from discovery.values()
+
+
+def _make_link(options: LinkOptions) -> Link:
+    match options.kind:
+        case "serial" | "multiserial":
+            return SerialLink(options.devices, options.baudrate)
+        case "pseudoterminal":
+            return PseudoterminalLink(options.devices[0] if options.devices else None)
+        case "canfd":
+            return CanLink(options.devices[0])
+        case kind:
+            return LINK_KINDS[kind](options.port, options.bind)
+
+
+async def _serve(options: AgentOptions, profiles: Profiles) -> None:
+    log = Log(sys.stdout, STYLES[options.log_style](), verbose=options.verbose, color=options.color)
+    agent = Agent(
+        options.space,
+        references=ReferenceChain(profiles, NamedReferences()),
+        domain=options.domain_override or 0,
+        forget_silent=None if options.forget is None else round(options.forget * 1000),
+    )
+
+    def on_message(link: Link, incoming: bool, data: bytes, address: Address) -> None:
+        log.message(Message(link.name, link.describe(address), incoming, data))
+
+    links = list(make_links(options))
+    for link in links:
+        agent.add_link(Tap(link, on_message) if options.verbose >= DEBUG else link)
+    early: list[Event | Finding] = []
+    unwatch = agent.on_event(early.append), agent.on_finding(early.append)
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop.set)
+    await agent.start()
+    try:
+        # The banner comes first: only open links know their ports.
+        log.started(_banner(options, links), [link.name for link in links])
+        for end in unwatch:
+            end()
+        for each in early:
+            if isinstance(each, Finding):
+                log.finding(each)
+            elif not (isinstance(each, LinkUp) and options.log_style == "muros" and _in_banner(each)):
+                log.event(each)
+        agent.on_event(log.event)
+        agent.on_finding(log.finding)
+        await stop.wait()
+    finally:
+        agent.close()
+
+
+def _banner(options: AgentOptions, links: Sequence[Link]) -> str:
+    space = options.space.removesuffix(":")
+    return " · ".join([f"muros agent {__version__}", f"{space} space", *(link.name for link in links)])
+
+
+def _in_banner(event: LinkUp) -> bool:
+    return event.detail in ("", event.link)
+
+
+def _profiles(options: AgentOptions) -> Profiles:
+    if options.refs is None:
+        return Profiles()
+    try:
+        return Profiles.load(options.refs)
+    except ProfilesError as error:
+        if not options.refs_optional:
+            raise
+        _say(f"{error}; going on without profiles")
+        return Profiles()
+
+
+def _say(text: object) -> None:
+    print(f"muros: {text}", file=sys.stderr)
+
+
+def _fail(error: Exception, status: int) -> int:
+    _say(error)
+    return status
