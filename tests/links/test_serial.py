@@ -248,6 +248,20 @@ class TestSerialPort:
 
         run(body)
 
+    def test_a_pattern_that_nothing_matches_is_told_once(self, tmp_path: Path) -> None:
+        async def body() -> None:
+            events = Watcher()
+            link = SerialLink(str(tmp_path / "ttyACM*"), retry=RETRY_S)
+            link.open(events)
+            assert events.codes() == ["port-absent"]
+            device = Device(tmp_path / "ttyACM5")
+            await events.until(lambda: events.up)
+            assert events.codes() == ["port-absent"]
+            link.close()
+            device.pull()
+
+        run(body)
+
     def test_clients_share_a_line_by_address(self, tmp_path: Path) -> None:
         async def body() -> None:
             device = Device(tmp_path / "rs485")

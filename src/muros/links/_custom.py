@@ -11,8 +11,8 @@ from collections.abc import Callable
 from typing import ClassVar, TypeAlias
 
 from muros.links._datagram import DRAIN
-from muros.links._door import CLOSED, PORT_GONE, QUEUE_FULL, Address, Cause, Link, LinkError
-from muros.links._framing import MESSAGE_BYTES, Framing, MakeFraming, SerialFraming
+from muros.links._door import PORT_GONE, QUEUE_FULL, Address, Cause, Link, LinkError
+from muros.links._framing import MESSAGE_BYTES, NOT_FRAMES, Cutter, MakeFraming, SerialFraming
 
 POLL_S = 0.005
 """How often ``read`` is asked when there is no descriptor to watch, in seconds."""
@@ -71,8 +71,7 @@ class CustomLink(Link):
         self._retry = retry
         self._drain = drain
         self._make_framing = make_framing
-        self._framing: Framing | None = None
-        self._seen: dict[str, int] = {}
+        self._cutter: Cutter | None = None
         self._watched: int | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._ready = False
@@ -85,28 +84,21 @@ class CustomLink(Link):
     def describe(self, address: Address) -> str:
         return f"{self._name}#{address}" if self._framed else str(address)
 
-    def send(self, message: bytes, address: Address) -> bool:
+    def _send(self, message: bytes, address: Address) -> Cause | None:
         if not self._ready:
-            return self._drop(PORT_GONE if self.is_open else CLOSED, len(message), address)
-        if len(message) > self.mtu:
-            return self._drop_too_long(len(message), address)
+            return PORT_GONE
         write = self._functions[3]
         try:
-            if self._framing is not None:
-                done = write(self._framing.frame(message, int(address)))  # type: ignore[call-overload]
+            if self._cutter is not None:
+                done = write(self._cutter.framing.frame(message, int(address)))  # type: ignore[call-overload]
             elif self._addressed:
                 done = write(message, address)
             else:
                 done = write(message)
         except Exception as error:  # the user's code: whatever it raises must not reach the other links
             asyncio.get_running_loop().call_soon(self._failed, "write", error, self._generation)
-            return self._drop(PORT_GONE, len(message), address)
-        if done is False:
-            return self._drop(QUEUE_FULL, len(message), address)
-        counters = self.counters
-        counters.sent += 1
-        counters.sent_bytes += len(message)
-        return True
+            return PORT_GONE
+        return QUEUE_FULL if done is False else None
 
     def _open(self) -> None:
         try:
@@ -128,8 +120,7 @@ class CustomLink(Link):
         self._ready = True
         self._generation += 1
         if self._framed:
-            self._framing = self._make_framing()
-            self._seen = dict(self._framing.errors())
+            self._cutter = Cutter(self._make_framing())
         loop = asyncio.get_running_loop()
         if handle is None:
             self._timer = loop.call_later(self._poll, self._polled)
@@ -186,27 +177,22 @@ class CustomLink(Link):
     def _take(self, got: bytes | tuple[bytes, Address]) -> None:
         if isinstance(got, tuple):
             self._deliver(*got)
-        elif self._framing is None:
+        elif self._cutter is None:
             self._deliver(got, PEER)
         else:
-            framing = self._framing
-            messages = framing.feed_untrusted(got)
-            self._count_damage(framing)
+            messages = self._cutter.framing.feed_untrusted(got)
+            errors = self._cutter.fresh_errors()
+            if errors:
+                self._damaged(errors)
             for message, peer in messages:
                 self._deliver(message, peer)
 
-    def _count_damage(self, framing: Framing) -> None:
-        errors = dict(framing.errors())
-        if errors != self._seen:
-            fresh = {kind: n - self._seen.get(kind, 0) for kind, n in errors.items()}
-            self._seen = errors
-            self.counters.framing.update({kind: n for kind, n in fresh.items() if n})
-            bad = sum(n for kind, n in fresh.items() if kind not in ("garbage", "wrong-address"))
-            if bad:
-                cause = Cause(
-                    "line-noise", "the stream is damaged", "Check that read gives every byte, once."
-                )
-                self._problem(cause, f"bad frames on {self._name} dropped", bad)
+    def _damaged(self, errors: dict[str, int]) -> None:
+        self.counters.framing.update(errors)
+        bad = sum(n for kind, n in errors.items() if kind not in NOT_FRAMES)
+        if bad:
+            cause = Cause("line-noise", "the stream is damaged", "Check that read gives every byte, once.")
+            self._problem(cause, f"bad frames on {self._name} dropped", bad)
 
     def _failed(self, function: str, error: Exception, generation: int) -> None:
         if not self._ready or generation != self._generation:

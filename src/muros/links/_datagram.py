@@ -8,7 +8,7 @@ import socket
 from abc import abstractmethod
 from collections import deque
 
-from muros.links._door import CLOSED, NETWORK, QUEUE_FULL, Address, Link
+from muros.links._door import NETWORK, PORT_GONE, QUEUE_FULL, Address, Cause, Link
 
 DRAIN = 64
 """Datagrams taken in one wake-up before other links get their turn."""
@@ -31,11 +31,9 @@ class DatagramLink(Link):
         self._socket: socket.socket | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
 
-    def send(self, message: bytes, address: Address) -> bool:
+    def _send(self, message: bytes, address: Address) -> Cause | None:
         if self._socket is None:
-            return self._drop(CLOSED, len(message), address)
-        if len(message) > self.mtu:
-            return self._drop_too_long(len(message), address)
+            return PORT_GONE
         if self._queue:
             return self._enqueue(message, address)
         try:
@@ -45,13 +43,10 @@ class DatagramLink(Link):
             return self._enqueue(message, address)
         except OSError as error:
             if error.errno != errno.ENOBUFS:
-                return self._send_failed(error, message, address)
+                return _refused(error)
             self._wait_device()
             return self._enqueue(message, address)
-        counters = self.counters
-        counters.sent += 1
-        counters.sent_bytes += len(message)
-        return True
+        return None
 
     @abstractmethod
     def _transmit(self, sock: socket.socket, message: bytes, address: Address) -> None:
@@ -63,10 +58,6 @@ class DatagramLink(Link):
 
     def _receive_failed(self, error: OSError) -> None:
         """An error other than an empty socket. Most are left over from an earlier send: nothing is lost."""
-
-    def _send_failed(self, error: OSError, message: bytes, address: Address) -> bool:
-        cause = NETWORK._replace(why=f"the network refused it ({error.strerror or error})")
-        return self._drop(cause, len(message), address)
 
     def _start(self, sock: socket.socket) -> None:
         self._socket = sock
@@ -102,14 +93,12 @@ class DatagramLink(Link):
             if got is not None:
                 deliver(*got)
 
-    def _enqueue(self, message: bytes, address: Address) -> bool:
+    def _enqueue(self, message: bytes, address: Address) -> Cause | None:
         if self._queue and self._queued + len(message) > self._queue_bytes:
-            return self._drop(QUEUE_FULL, len(message), address)
+            return QUEUE_FULL
         self._queue.append((message, address))
         self._queued += len(message)
-        self.counters.sent += 1
-        self.counters.sent_bytes += len(message)
-        return True
+        return None
 
     def _flush(self) -> None:
         self._retry = None
@@ -128,7 +117,7 @@ class DatagramLink(Link):
                     return
                 self.counters.sent -= 1
                 self.counters.sent_bytes -= len(message)
-                self._send_failed(error, message, address)
+                self._drop(_refused(error), len(message), address)
             if self._queue:  # else a handler has closed the link
                 self._queue.popleft()
                 self._queued -= len(message)
@@ -145,3 +134,7 @@ class DatagramLink(Link):
         if self._loop is not None and self._socket is not None:
             self._loop.remove_writer(self._socket)
             self._retry = self._loop.call_later(RETRY_FULL_S, self._flush)
+
+
+def _refused(error: OSError) -> Cause:
+    return NETWORK._replace(why=f"the network refused it ({error.strerror or error})")

@@ -68,6 +68,9 @@ QUEUE_FULL = Cause(
     "Send less or less often, use a faster line, or enlarge queue_bytes of the link.",
 )
 NETWORK = Cause("network-refused", "the network refused it", "Check the route and the firewall to the peer.")
+TOO_LONG = Cause(
+    "message-too-long", "it is longer than the link's mtu", "Use a reliable stream, which fragments."
+)
 EMPTY = Cause("empty-message", "a message of 0 B says nothing", "Check what else sends to this link.")
 
 
@@ -126,9 +129,21 @@ class Link(ABC):
         self._events = None
         self._close()
 
-    @abstractmethod
     def send(self, message: bytes, address: Address) -> bool:
         """Sends one whole message. False: dropped, counted and told; never raises for what a network or peer does."""
+        size = len(message)
+        if self._events is None:
+            return self._drop(CLOSED, size, address)
+        if size > self.mtu:
+            why = f"this link carries at most {self.mtu} B in a message"
+            return self._drop(TOO_LONG._replace(why=why), size, address)
+        cause = self._send(message, address)
+        if cause is not None:
+            return self._drop(cause, size, address)
+        counters = self.counters
+        counters.sent += 1
+        counters.sent_bytes += size
+        return True
 
     def describe(self, address: Address) -> str:
         """The address for people: ``192.168.1.23:50210``, ``/dev/ttyUSB0#1``."""
@@ -143,6 +158,10 @@ class Link(ABC):
 
     @abstractmethod
     def _close(self) -> None: ...
+
+    @abstractmethod
+    def _send(self, message: bytes, address: Address) -> Cause | None:
+        """Sends a message that fits, on an open link; why it is dropped, or None."""
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name}{'' if self.is_open else ', closed'}>"
@@ -159,17 +178,11 @@ class Link(ABC):
         counters.received_bytes += len(message)
         events.on_message(self, message, address)
 
-    def _drop(self, cause: Cause, size: int, address: Address, n: int = 1) -> bool:
-        """Counts and tells ``n`` messages that are not sent; answers False for `send` to return."""
-        self.counters.dropped[cause.code] += n
-        self._problem(cause, f"message of {size} B to {self.describe(address)} not sent", n)
+    def _drop(self, cause: Cause, size: int, address: Address) -> bool:
+        """Counts and tells a message that is not sent; answers False for `send` to return."""
+        self.counters.dropped[cause.code] += 1
+        self._problem(cause, f"message of {size} B to {self.describe(address)} not sent")
         return False
-
-    def _drop_too_long(self, size: int, address: Address) -> bool:
-        why = f"this link carries at most {self.mtu} B in a message"
-        return self._drop(
-            Cause("message-too-long", why, "Use a reliable stream, which fragments."), size, address
-        )
 
     def _dropped_incoming(self, cause: Cause, address: Address) -> None:
         self.counters.dropped[cause.code] += 1

@@ -17,6 +17,10 @@ MESSAGE_BYTES = 65535
 """Longest message: its length is a u16 in both framings."""
 
 
+NOT_FRAMES = frozenset({"garbage", "wrong-address"})
+"""Kinds of `Framing.errors` that are no damaged frames of ours: other bytes, and frames for others."""
+
+
 class Framing(Protocol):
     """Cuts one byte stream into messages and makes the frames for the way back."""
 
@@ -35,6 +39,22 @@ class Framing(Protocol):
 
 MakeFraming: TypeAlias = Callable[[], Framing]
 """Makes the framing of a new line or connection."""
+
+
+class Cutter:
+    """A framing, and what is new about its errors."""
+
+    def __init__(self, framing: Framing) -> None:
+        self.framing = framing
+        self._seen = dict(framing.errors())
+
+    def fresh_errors(self) -> dict[str, int]:
+        """The kinds of error that have happened since the last call, with their numbers."""
+        errors = self.framing.errors()
+        if errors == self._seen:
+            return {}
+        seen, self._seen = self._seen, dict(errors)
+        return {kind: n - seen.get(kind, 0) for kind, n in errors.items() if n != seen.get(kind, 0)}
 
 
 class SerialFraming:

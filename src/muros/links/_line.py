@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
-from muros.links._door import CLOSED, PORT_GONE, QUEUE_FULL, Address, Cause, Link
-from muros.links._framing import MESSAGE_BYTES, MakeFraming
+from muros.links._door import PORT_GONE, QUEUE_FULL, Address, Cause, Link
+from muros.links._framing import MESSAGE_BYTES, NOT_FRAMES, MakeFraming
 from muros.links._stream import Channel
 
 QUEUE_BYTES = 16 * 1024
 """Bytes that may wait for a line beyond the kernel's few kB: 1.4 s at 115200 baud."""
 GARBAGE_BYTES = 4096
 """So many bytes without one good frame make a finding."""
-
-_DAMAGE = ("bad-crc", "bad-length", "cut")
 
 
 class LineAddress(NamedTuple):
@@ -44,18 +43,11 @@ class LineLink(Link):
     def describe(self, address: Address) -> str:
         return f"{address.device}#{address.peer}" if isinstance(address, LineAddress) else str(address)
 
-    def send(self, message: bytes, address: Address) -> bool:
+    def _send(self, message: bytes, address: Address) -> Cause | None:
         port = self._ports.get(address.device) if isinstance(address, LineAddress) else None
         if port is None or not isinstance(address, LineAddress):
-            return self._drop(PORT_GONE if self.is_open else CLOSED, len(message), address)
-        if len(message) > self.mtu:
-            return self._drop_too_long(len(message), address)
-        if not port.channel.send(message, address.peer):
-            return self._drop(QUEUE_FULL, len(message), address)
-        counters = self.counters
-        counters.sent += 1
-        counters.sent_bytes += len(message)
-        return True
+            return PORT_GONE
+        return None if port.channel.send(message, address.peer) else QUEUE_FULL
 
     def _close(self) -> None:
         for port in self._ports.values():
@@ -75,11 +67,11 @@ class LineLink(Link):
 
     def _damaged(self, port: Port, errors: dict[str, int]) -> None:
         self.counters.framing.update(errors)
-        n = sum(errors.get(kind, 0) for kind in _DAMAGE)
-        if n:
-            kinds = ", ".join(f"{errors[kind]} {kind}" for kind in _DAMAGE if kind in errors)
+        bad = {kind: n for kind, n in errors.items() if kind not in NOT_FRAMES}
+        if bad:
+            kinds = ", ".join(f"{n} {kind}" for kind, n in bad.items())
             cause = Cause("line-noise", f"line noise or wrong baud rate ({kinds})", self._noise_remedy())
-            self._problem(cause, f"bad frames on {port.device} dropped", n)
+            self._problem(cause, f"bad frames on {port.device} dropped", sum(bad.values()))
         port.garbage += errors.get("garbage", 0)
         if port.garbage >= GARBAGE_BYTES:
             why = "wrong baud rate, or the far end writes something else there"
@@ -112,9 +104,9 @@ class Port:
             fd,
             link.make_framing(),
             link.queue_bytes,
-            lambda _, messages: link._messages(self, messages),
-            lambda _, errors: link._damaged(self, errors),
-            lambda _, reason: link._ended(self, reason),
+            partial(link._messages, self),
+            partial(link._damaged, self),
+            partial(link._ended, self),
         )
 
     def shut(self) -> None:

@@ -81,7 +81,10 @@ class SerialLink(LineLink):
         self._timer = None
         for wanted in self.devices:
             pattern = glob.has_magic(wanted)
-            for device in sorted(glob.glob(wanted)) if pattern else (wanted,):
+            devices = sorted(glob.glob(wanted)) if pattern else [wanted]
+            if first and not devices:
+                self._tell(wanted, _absent())
+            for device in devices:
                 if not self.is_open:  # a handler has closed the link
                     return
                 if device not in self._ports and os.path.realpath(device) not in self._real_paths():
@@ -105,9 +108,7 @@ class SerialLink(LineLink):
         try:
             fd = open_terminal(device, self.baud)
         except AbsentError:
-            others = ", ".join(serial_ports()) or "none"
-            remedy = f"Plug it in: it is taken as soon as it appears. Ports that are here now: {others}."
-            self._tell(device, Cause("port-absent", _ABSENT, remedy))
+            self._tell(device, _absent())
             return
         except LinkError as error:
             if strict:
@@ -132,6 +133,12 @@ class SerialLink(LineLink):
         if self._timer is None:
             self._timer = asyncio.get_running_loop().call_later(self._retry, self._look)
         super()._ended(port, why)
+
+
+def _absent() -> Cause:
+    others = ", ".join(serial_ports()) or "none"
+    remedy = f"Plug it in: it is taken as soon as it appears. Ports that are here now: {others}."
+    return Cause("port-absent", _ABSENT, remedy)
 
 
 def devices_from_file(path: str, *, several: bool = False) -> list[str]:

@@ -10,10 +10,8 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from muros.links._framing import Framing
+from muros.links._framing import Cutter, Framing
 
 READ_BYTES = 65536
 """Most bytes read from a stream in one wake-up."""
@@ -113,8 +111,8 @@ class ByteStream:
 class Channel:
     """A byte stream that carries messages.
 
-    ``on_messages(channel, messages)`` gets each batch of (message, peer number); ``on_damage(channel, errors)`` the
-    kinds and numbers of framing errors that a read has shown; ``on_end(channel, reason)`` ends it.
+    ``on_messages`` gets each batch of (message, peer number), ``on_damage`` the kinds and numbers of framing errors
+    that a read has shown, ``on_end`` the reason why the stream has ended.
     """
 
     def __init__(
@@ -122,16 +120,15 @@ class Channel:
         fd: int,
         framing: Framing,
         queue_bytes: int,
-        on_messages: Callable[[Channel, list[tuple[bytes, int]]], None],
-        on_damage: Callable[[Channel, dict[str, int]], None],
-        on_end: Callable[[Channel, str], None],
+        on_messages: Callable[[list[tuple[bytes, int]]], None],
+        on_damage: Callable[[dict[str, int]], None],
+        on_end: Callable[[str], None],
     ) -> None:
-        self.framing = framing
+        self._framing = framing
+        self._cutter = Cutter(framing)
         self._on_messages = on_messages
         self._on_damage = on_damage
-        self._on_end = on_end
-        self._seen = dict(framing.errors())
-        self._stream = ByteStream(fd, queue_bytes, self._take, self._end)
+        self._stream = ByteStream(fd, queue_bytes, self._take, on_end)
 
     @property
     def queued(self) -> int:
@@ -140,21 +137,16 @@ class Channel:
 
     def send(self, message: bytes, peer: int) -> bool:
         """Sends or queues one message; False when there is no room for it."""
-        return self._stream.write(self.framing.frame(message, peer))
+        return self._stream.write(self._framing.frame(message, peer))
 
     def stop(self) -> None:
         """Ends in silence."""
         self._stream.stop()
 
     def _take(self, data: bytes) -> None:
-        messages = self.framing.feed_untrusted(data)
-        errors = self.framing.errors()
-        if errors != self._seen:
-            fresh = {kind: n - self._seen.get(kind, 0) for kind, n in errors.items()}
-            self._seen = dict(errors)
-            self._on_damage(self, {kind: n for kind, n in fresh.items() if n})
+        messages = self._framing.feed_untrusted(data)
+        errors = self._cutter.fresh_errors()
+        if errors:
+            self._on_damage(errors)
         if messages:
-            self._on_messages(self, messages)
-
-    def _end(self, reason: str) -> None:
-        self._on_end(self, reason)
+            self._on_messages(messages)

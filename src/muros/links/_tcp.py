@@ -6,9 +6,10 @@ import asyncio
 import errno
 import socket
 from contextlib import suppress
+from functools import partial
 from typing import ClassVar
 
-from muros.links._door import CLOSED, NO_PEER, QUEUE_FULL, Address, Cause, Link, Locator
+from muros.links._door import NO_PEER, QUEUE_FULL, Address, Cause, Link, Locator
 from muros.links._framing import MESSAGE_BYTES, LengthFraming, MakeFraming
 from muros.links._sockets import ANY, bound_socket, join, socket_locators
 from muros.links._stream import Channel
@@ -76,18 +77,11 @@ class TcpLink(Link):
     def locators(self) -> list[Locator]:
         return socket_locators(self.family, self.host, self.port)
 
-    def send(self, message: bytes, address: Address) -> bool:
+    def _send(self, message: bytes, address: Address) -> Cause | None:
         connection = self._connections.get(address)
         if connection is None:
-            return self._drop(NO_PEER if self.is_open else CLOSED, len(message), address)
-        if len(message) > self.mtu:
-            return self._drop_too_long(len(message), address)
-        if not connection.channel.send(message, 0):
-            return self._drop(QUEUE_FULL, len(message), address)
-        counters = self.counters
-        counters.sent += 1
-        counters.sent_bytes += len(message)
-        return True
+            return NO_PEER
+        return None if connection.channel.send(message, 0) else QUEUE_FULL
 
     def _open(self) -> None:
         kind = f"{self.kind}{self.family}"
@@ -124,6 +118,10 @@ class TcpLink(Link):
                     continue  # that one connection has failed already
                 self._pause(error)
                 return
+            old = self._connections.get(address)
+            if old is not None:  # it came to another address of this host
+                old.channel.stop()
+                self._ended(old, "replaced by a new one")
             if len(self._connections) >= self._limit:
                 sock.close()
                 self._refuse(address)
@@ -171,7 +169,8 @@ class TcpLink(Link):
         connection.sock.close()
         del self._connections[connection.address]
         if self._events is not None:
-            why = f"connection {reason}" if reason.startswith("closed") else f"connection lost ({reason})"
+            known = reason.startswith(("closed", "replaced"))
+            why = f"connection {reason}" if known else f"connection lost ({reason})"
             self._events.on_gone(self, connection.address, why)
 
 
@@ -187,9 +186,9 @@ class _Connection:
             sock.fileno(),
             link._make_framing(),
             link._queue_bytes,
-            lambda _, messages: link._messages(self, messages),
-            lambda _, errors: link._damaged(self, errors),
-            lambda _, reason: link._ended(self, reason),
+            partial(link._messages, self),
+            partial(link._damaged, self),
+            partial(link._ended, self),
         )
 
 

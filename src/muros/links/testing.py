@@ -5,7 +5,7 @@ owns no clock and needs no asyncio: time is the number given to `SimulatedNetwor
 are in the same). `SimulatedLink` puts a `Link` on such a network, `PairLink` is a link whose peers are plain objects in
 the test, and `Recorder` is a `LinkEvents` that keeps what a link tells.
 
-    network = SimulatedNetwork(seed=3, loss=0.1, delay=(0.001, 0.020))
+    network = SimulatedNetwork(seed=1, loss=0.1, delay=(0.001, 0.020))
     client = network.endpoint("client")
     agent = network.endpoint("agent", lambda data, sender: agent.send(data.upper(), sender))
     client.send(b"hello", "agent")
@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
 from typing import ClassVar, TypeAlias
 
-from muros.links._door import CLOSED, NO_PEER, Address, Link, LinkEvents, Locator
+from muros.links._door import NO_PEER, Address, Cause, Link, LinkEvents, Locator
 
 __all__ = [
     "Datagram",
@@ -276,15 +276,10 @@ class SimulatedLink(Link):
     def name(self) -> str:
         return f"{self.kind} {self.address}"
 
-    def send(self, message: bytes, address: Address) -> bool:
-        if self._endpoint is None:
-            return self._drop(CLOSED, len(message), address)
-        if len(message) > self.mtu:
-            return self._drop_too_long(len(message), address)
-        self._endpoint.send(message, address)
-        self.counters.sent += 1
-        self.counters.sent_bytes += len(message)
-        return True
+    def _send(self, message: bytes, address: Address) -> Cause | None:
+        if self._endpoint is not None:
+            self._endpoint.send(message, address)
+        return None
 
     def _open(self) -> None:
         self._endpoint = self.network.endpoint(self.address, self._deliver)
@@ -325,16 +320,12 @@ class PairLink(Link):
             self._peers[address] = Peer(self, address)
         return self._peers[address]
 
-    def send(self, message: bytes, address: Address) -> bool:
+    def _send(self, message: bytes, address: Address) -> Cause | None:
         peer = self._peers.get(address)
-        if not self.is_open or peer is None:
-            return self._drop(NO_PEER if self.is_open else CLOSED, len(message), address)
-        if len(message) > self.mtu:
-            return self._drop_too_long(len(message), address)
-        self.counters.sent += 1
-        self.counters.sent_bytes += len(message)
+        if peer is None:
+            return NO_PEER
         peer.received.append(bytes(message))
-        return True
+        return None
 
     def _open(self) -> None:
         if self._events is not None:
