@@ -220,6 +220,26 @@ def test_the_help_names_everything_and_fits_the_terminal() -> None:
     assert max(map(len, text.splitlines())) <= 108
 
 
+MANUAL = Path(__file__).parents[2] / "docs/agent-command-line.md"
+
+
+def test_the_manual_names_everything() -> None:
+    text = MANUAL.read_text()
+    for option in OPTIONS:
+        for flag in option.flags:
+            assert f"`{flag}`" in text or f"`{flag} " in text
+    for word in TRANSPORTS:
+        assert f"`{word}`" in text
+
+
+def test_the_example_of_the_manual_works(tmp_path: Path) -> None:
+    example = MANUAL.read_text().partition("```toml\n")[2].partition("```")[0]
+    options = parse(f"--config {config(tmp_path, example)}")
+    assert [link.kind for link in options.links] == ["udp4", "multiserial"]
+    assert options.links[1].devices == ("/dev/ttyUSB0", "/dev/ttyACM0")
+    assert options.refs == tmp_path / "profiles.refs"
+
+
 CONFIG = """\
 verbose = 5
 middleware = "ced"
