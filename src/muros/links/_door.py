@@ -159,9 +159,9 @@ class Link(ABC):
     @abstractmethod
     def _close(self) -> None: ...
 
-    @abstractmethod
     def _send(self, message: bytes, address: Address) -> Cause | None:
-        """Sends a message that fits, on an open link; why it is dropped, or None."""
+        """Sends a message that fits, on an open link; why it is dropped, or None. Not for links with a `send`."""
+        raise NotImplementedError
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name}{'' if self.is_open else ', closed'}>"
