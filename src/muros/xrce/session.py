@@ -1,9 +1,9 @@
 """A session without I/O: the header of its messages, its streams and their acknowledgements, for either role.
 
 The core answers what belongs to the streams itself (ACKNACK, HEARTBEAT, FRAGMENT) and gives every other submessage
-to ``handle(kind, flags, buf, off, n, stream_id)``, which returns ``HANDLED``, ``FAILED`` or ``LATER``. ``LATER`` holds the
-stream: this submessage and what follows on the stream stays unacknowledged until ``resume`` is called, which is how
-a slow reader pushes back on a writer. Messages leave through ``send(buf, off, n)``, whose bytes are only lent.
+to ``handle(kind, flags, buf, off, n, stream_id)``, which returns ``HANDLED``, ``FAILED`` or ``LATER``. ``LATER`` holds
+the stream: this submessage and what follows on the stream stays unacknowledged until ``resume`` is called, which is
+how a slow reader pushes back on a writer. Messages leave through ``send(buf, off, n)``, whose bytes are only lent.
 
 What differs between the roles are values: the heartbeat period, the windows, and whether streams a peer names come
 into being (an agent's) or not (a client's).
