@@ -204,6 +204,17 @@ class SpaceConformance:
         self.settle(space)
         assert calls == [reader, reader]
 
+    def test_overwriting_is_no_news(self, space: Space) -> None:
+        calls: list[Reader] = []
+        writer = space.participant("talker").writer(CHATTER, RELIABLE)
+        reader = space.participant("listener").reader(CHATTER, Qos(depth=1), calls.append)
+        self.settle(space)
+        for i in range(3):
+            writer.write(numbered(i))
+            self.settle(space)
+        assert calls == [reader]
+        assert take_all(reader) == [numbered(2)]
+
     def test_a_callback_that_raises_is_a_finding_and_harms_nobody(
         self, space: Space, told: list[Finding]
     ) -> None:
@@ -227,12 +238,13 @@ class SpaceConformance:
         assert "conformance.py:" in finding.why
         assert space.findings.counts() == {"callback-failed": 3}
 
-    def test_ping_pong_takes_turns(self, space: Space) -> None:
+    @pytest.mark.parametrize("qos", [RELIABLE, KEEP_ALL], ids=str)
+    def test_ping_pong_takes_turns(self, space: Space, qos: Qos) -> None:
         """Two nodes that answer each other: no recursion, everything in order."""
         rounds, depth, deepest = 5000, 0, 0
         ping, pong = Topic("rt/ping", "T"), Topic("rt/pong", "T")
         a, b = space.participant("a"), space.participant("b")
-        to_b, to_a = a.writer(ping, RELIABLE), b.writer(pong, RELIABLE)
+        to_b, to_a = a.writer(ping, qos), b.writer(pong, qos)
         heard: list[int] = []
 
         def answer(reader: Reader) -> None:
@@ -246,8 +258,8 @@ class SpaceConformance:
                     (to_a if reader is at_b else to_b).write(numbered(n + 1))
             depth -= 1
 
-        at_b = b.reader(ping, RELIABLE, answer)
-        a.reader(pong, RELIABLE, answer)
+        at_b = b.reader(ping, qos, answer)
+        a.reader(pong, qos, answer)
         self.settle(space)
         to_b.write(numbered(0))
         self.settle(space)
@@ -449,6 +461,20 @@ class SpaceConformance:
         assert take_all(reader) == [numbered(i) for i in range(1, sent + 1)]
         assert (reader.lost, told) == (0, [])
 
+    def test_patience_begins_anew_after_room(self, space: Space) -> None:
+        writer = space.participant("talker").writer(CHATTER, KEEP_ALL)
+        reader = space.participant("listener").reader(CHATTER, KEEP_ALL)
+        self.settle(space)
+        while writer.write(b"x"):
+            self.settle(space)
+        for _ in range(3):
+            assert reader.take() is not None
+            self.settle(space)
+            assert writer.write(b"x")
+            self.pass_time(space, 2 * self.PATIENCE)
+            assert not writer.write(b"x"), "full again, for no time yet"
+        assert reader.lost == 0
+
     def test_a_stuck_reader_holds_up_others_only_for_a_while(self, space: Space, told: list[Finding]) -> None:
         writer = space.participant("talker").writer(CHATTER, KEEP_ALL)
         stuck = space.participant("stuck").reader(CHATTER, KEEP_ALL)
@@ -529,8 +555,11 @@ class SpaceConformance:
         returned = True
         volatile = space.participant("volatile").reader(CHATTER, RELIABLE)
         shallow = space.participant("shallow").reader(CHATTER, LATCHED.replace(depth=1))
+        deep = space.participant("deep").reader(CHATTER, LATCHED.replace(depth=10))
         self.settle(space)
         assert calls == [3]
+        assert take_all(shallow) == [numbered(4)]
+        assert take_all(deep) == [numbered(2), numbered(3), numbered(4)], "the writer keeps 3"
         writer.write(numbered(5))
         self.settle(space)
         assert take_all(late) == [numbered(i) for i in (3, 4, 5)], "depth 3: sample 2 made room for 5"
@@ -602,6 +631,23 @@ class SpaceConformance:
         self.settle(space)
         assert take_all(reader) == [b"new"]
         assert (reader.expired, reader.lost) == (self.LIMIT, 0)
+
+    @pytest.mark.parametrize(
+        "wanted", [Qos(Reliability.BEST_EFFORT, history=History.KEEP_ALL), Qos(depth=3)], ids=str
+    )
+    def test_expired_samples_take_no_room(self, space: Space, wanted: Qos) -> None:
+        writer = space.participant("talker").writer(CHATTER, RELIABLE.replace(lifespan=SECOND))
+        reader = space.participant("listener").reader(CHATTER, wanted)
+        self.settle(space)
+        held = self.LIMIT if wanted.keeps_all else wanted.depth
+        for _ in range(held):
+            writer.write(b"old")
+            self.settle(space)
+        self.pass_time(space, SECOND)
+        writer.write(b"new")
+        self.settle(space)
+        assert take_all(reader) == [b"new"]
+        assert (reader.expired, reader.lost) == (held, 0)
 
     def test_deadlines(self, space: Space, told: list[Finding]) -> None:
         qos = RELIABLE.replace(deadline=100 * MS)
@@ -699,6 +745,28 @@ class SpaceConformance:
         self.settle(space)
         assert answers == wanted
 
+    def test_a_client_that_asks_again_when_answered(self, space: Space) -> None:
+        replier = space.participant("server").replier(
+            ADD, None, lambda identity, data: replier.reply(identity, data)
+        )
+        heard: list[int] = []
+        depth = 0
+
+        def again(number: int, data: bytes) -> None:
+            nonlocal depth
+            depth += 1
+            assert depth == 1
+            heard.append(int.from_bytes(data, "little"))
+            if len(heard) < 2000:
+                requester.send(numbered(len(heard)))
+            depth -= 1
+
+        requester = space.participant("client").requester(ADD, None, again)
+        self.settle(space)
+        requester.send(numbered(0))
+        self.settle(space)
+        assert heard == list(range(2000))
+
     def test_every_server_gets_the_request(self, space: Space, told: list[Finding]) -> None:
         answers: list[bytes] = []
         servers: dict[bytes, Replier] = {}
@@ -713,7 +781,10 @@ class SpaceConformance:
         requester.send(b"?")
         self.settle(space)
         assert sorted(answers) == [b"a", b"b"]
+        space.participant("ear").reader(Topic(ADD.request_topic, ADD.request_type))
+        self.settle(space)
         assert [(f.code, f.subject) for f in told] == [("several-servers", "/add_two_ints")]
+        assert space.findings.counts() == {"several-servers": 1}
 
     def test_a_request_waits_for_its_server(self, space: Space, told: list[Finding]) -> None:
         requester = space.participant("client").requester(ADD)

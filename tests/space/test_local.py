@@ -283,7 +283,8 @@ class TestOrder:
             calls: list[Reader] = []
             space.on_wake(lambda: wakes.append(1))
             reader = space.participant("r").reader(CHATTER, LATCHED, calls.append)
-            assert (reader.pending, calls, wakes) == (1, [], [1])
+            space.participant("r2").reader(CHATTER, LATCHED, lambda reader: take_all(reader))
+            assert (reader.pending, calls, wakes) == (1, [], [1]), "woken once for both"
             space.tick()
             assert calls == [reader]
 
@@ -336,7 +337,7 @@ class TestOrder:
             assert reader.lost == 1
 
     def test_a_closed_writer_leaves_the_line(self, clock: Clock) -> None:
-        with open_space(clock=clock, resource_limit=1) as space:
+        with open_space(clock=clock, resource_limit=2) as space:
             node = space.participant("node")
             reader = node.reader(CHATTER, KEEP_ALL)
             gone, stays = node.writer(CHATTER, KEEP_ALL), node.writer(CHATTER, KEEP_ALL)
@@ -344,8 +345,9 @@ class TestOrder:
             gone.on_room = lambda: calls.append("gone")
             stays.on_room = lambda: calls.append("stays")
             gone.write(b"1")
-            assert not gone.write(b"2")
-            assert not stays.write(b"2")
+            gone.write(b"2")
+            assert not gone.write(b"3")
+            assert not stays.write(b"3")
             gone.close()
             reader.take()
             space.tick()

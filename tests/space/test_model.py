@@ -15,7 +15,13 @@ from muros.space import Durability, History, Qos, Reader, Reliability, Topic, Wr
 MS = 1_000_000
 LIMIT = 4
 PATIENCE = 100 * MS
-TOPICS = [Topic("rt/a", "T"), Topic("rt/b", "T"), Topic("rt/a", "Other")]
+TOPICS = [
+    Topic("rt/a", "T"),
+    Topic("rt/a", "T"),
+    Topic("rt/a", "T"),
+    Topic("rt/b", "T"),
+    Topic("rt/a", "Other"),
+]
 KINDS = [
     Qos(depth=1),
     Qos(depth=3),
@@ -99,9 +105,13 @@ class LifeInASpace(RuleBasedStateMachine):
         self.readers.append(model)
 
     @precondition(lambda self: self.writers)
-    @rule(data=st.data())
-    def write(self, data: st.DataObject) -> None:
+    @rule(data=st.data(), times=st.integers(1, LIMIT + 2))
+    def write(self, data: st.DataObject, times: int) -> None:
         model = data.draw(st.sampled_from(self.writers))
+        for _ in range(times):
+            self._write(model)
+
+    def _write(self, model: WriterModel) -> None:
         writer = model.writer
         body = f"{self.writers.index(model)} {writer.gid.hex()} {model.written}".encode()
         peers = [r for r in self.readers if self._meet(writer, r.reader)]
@@ -140,7 +150,7 @@ class LifeInASpace(RuleBasedStateMachine):
             assert sample.data in model.came
             model.taken.append(sample.data)
 
-    @precondition(lambda self: self.readers)
+    @precondition(lambda self: len(self.readers) > 2)
     @rule(data=st.data())
     def reader_goes(self, data: st.DataObject) -> None:
         model = data.draw(st.sampled_from(self.readers))
@@ -148,7 +158,7 @@ class LifeInASpace(RuleBasedStateMachine):
         model.reader.close()
         assert model.reader.take() is None
 
-    @precondition(lambda self: self.writers)
+    @precondition(lambda self: len(self.writers) > 2)
     @rule(data=st.data())
     def writer_goes(self, data: st.DataObject) -> None:
         model = data.draw(st.sampled_from(self.writers))
@@ -165,6 +175,7 @@ class LifeInASpace(RuleBasedStateMachine):
         else:
             raise AssertionError("never done")
 
+    @precondition(lambda self: len(self.writers) + len(self.readers) > 5)
     @rule()
     def everybody_goes(self) -> None:
         self.node.close()
@@ -222,4 +233,4 @@ class LifeInASpace(RuleBasedStateMachine):
 
 
 TestLifeInASpace = LifeInASpace.TestCase
-TestLifeInASpace.settings = settings(max_examples=60, stateful_step_count=40, deadline=None)
+TestLifeInASpace.settings = settings(max_examples=100, stateful_step_count=50, deadline=None)

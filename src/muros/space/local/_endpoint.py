@@ -79,11 +79,6 @@ class LocalEndpoint(Closing):
         """Whether it is the request side of a service."""
         return False
 
-    @property
-    def idle(self) -> bool:
-        """Whether nobody could keep its deadline just now."""
-        return False
-
     def close(self) -> None:
         """Take it out of the space."""
         if not self.closed:
@@ -145,8 +140,6 @@ class DeadlineWatch:
         """A period may be over: the timer is not moved with every sample, so look when the last one came."""
         endpoint = self._endpoint
         self._timer = None
-        if endpoint.idle:
-            return
         core, period = endpoint.core, endpoint.qos.deadline
         periods = (core.timers.now() - self._base) // period
         self._base += periods * period

@@ -84,7 +84,7 @@ def _meet(writer: LocalWriter, reader: LocalReader) -> None:
 
 
 def _tell_unmatched(core: Core, writer: LocalWriter, reader: LocalReader) -> None:
-    if reader.deadline is not None and reader.idle:
+    if reader.deadline is not None and not reader.writers:
         reader.deadline.stop()
     if core.watchers:
         core.tell(Unmatched(writer.info(), reader.info()))

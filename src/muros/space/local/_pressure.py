@@ -77,9 +77,10 @@ class Pressure:
             self._call(self._line.popleft())
 
     def leave(self, writer: LocalWriter) -> None:
-        """`writer` has gone."""
+        """`writer` and the reader are no longer matched: it waits for nothing here."""
         if self._line is not None and writer in self._line:
             self._line.remove(writer)
+            self._call(writer)
 
     def _time_is_up(self) -> None:
         self._timer = None

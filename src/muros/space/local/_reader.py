@@ -150,11 +150,6 @@ class LocalReader(LocalEndpoint):
             except Exception as error:
                 self.core.failed(self.owner, self.on_data, error)
 
-    @property
-    def idle(self) -> bool:
-        """Whether there is no writer to keep the deadline."""
-        return not self.writers
-
     def detach(self) -> None:
         """Let go of everything held."""
         super().detach()

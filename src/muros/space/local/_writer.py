@@ -157,7 +157,9 @@ class LocalWriter(LocalEndpoint):
             reader.catch_up([s for s in self.history if not s.expires or s.expires > now])
 
     def disconnect(self, reader: LocalReader) -> None:
-        """`reader` goes."""
+        """It and `reader` part."""
+        if reader.pressure is not None:
+            reader.pressure.leave(self)
         client = reader.client_gid
         if client:
             self.clients = {k: r for k, r in (self.clients or {}).items() if r is not reader} or None
@@ -179,11 +181,6 @@ class LocalWriter(LocalEndpoint):
     def detach(self) -> None:
         """Let go of everything held."""
         super().detach()
-        if self.waiting:
-            self.waiting = False
-            for reader in self.readers:
-                if reader.pressure is not None:
-                    reader.pressure.leave(self)
         self.readers = ()
         self.clients = None
         self.history = None
