@@ -14,7 +14,10 @@ from collections.abc import Sequence
 from importlib import import_module
 from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType
-from typing import Any
+
+TYPE_CHECKING = False  # typing itself would cost more than all the rest
+if TYPE_CHECKING:
+    from typing import Any
 
 _KINDS = ("msg", "srv", "action")
 _ENDINGS = ("_msgs", "_srvs", "_interfaces", "_collector", "_arduino")
