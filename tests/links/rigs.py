@@ -155,7 +155,7 @@ class DiscoveryRig(UdpRig):
         self.link = DiscoveryLink(0, interface="lo")
 
 
-class _TcpClient(_SocketClient):
+class TcpClient(_SocketClient):
     def __init__(self, sock: socket.socket) -> None:
         super().__init__(sock, None)
         self.inbox: deque[bytes] = deque()
@@ -188,12 +188,12 @@ class TcpRig(Rig):
         super().__init__(folder)
         self.link: TcpLink = TcpLink(0, self.host, family=self.family, **options)
 
-    async def client(self) -> _TcpClient:
+    async def client(self) -> TcpClient:
         sock = socket.socket(socket.AF_INET if self.family == 4 else socket.AF_INET6)
         sock.setblocking(False)
         async with asyncio.timeout(PATIENCE_S):
             await asyncio.get_running_loop().sock_connect(sock, (self.host, self.link.port))
-        made = _TcpClient(sock)
+        made = TcpClient(sock)
         self.clients.append(made)
         return made
 

@@ -160,6 +160,34 @@ class TestEveryTransport:
 
         asyncio.run(main())
 
+    def test_a_handler_that_raises_is_told_and_harms_nobody(self, kind: str, tmp_path: Path) -> None:
+        class Faulty(Watcher):
+            def on_message(self, link: Link, data: bytes, address: Any) -> None:
+                super().on_message(link, data, address)
+                if data == b"poison":
+                    raise ZeroDivisionError
+
+        async def main() -> None:
+            failures: list[Any] = []
+            asyncio.get_running_loop().set_exception_handler(lambda _, context: failures.append(context))
+            rig = RIGS[kind](tmp_path)
+            events = Faulty(echo=True)
+            rig.link.open(events)
+            client = await rig.client()
+            for message in (b"poison", b"hello", b"poison", b"hello"):
+                await client.send(message)
+            await events.until(lambda: len(events.messages) == 4)
+            assert [type(failure["exception"]) for failure in failures] == [ZeroDivisionError] * 2
+            assert all(rig.link.name in failure["message"] for failure in failures)
+            assert not events.down
+            rig.close()
+
+        if kind in ("simulated", "pair"):
+            with pytest.raises(ZeroDivisionError):  # links for tests do not hide what a test must see
+                asyncio.run(main())
+        else:
+            asyncio.run(main())
+
     def test_garbage_is_counted_and_harms_nobody(self, kind: str, tmp_path: Path) -> None:
         async def body(rig: Rig, events: Watcher) -> None:
             source = random.Random(2)

@@ -187,6 +187,19 @@ class TestSerialPort:
 
         run(body)
 
+    def test_a_driver_that_refuses_the_rate(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        device = Device(tmp_path / "ttyUSB0")
+        real = termios.tcsetattr
+
+        def slower(fd: int, when: int, settings: list[Any]) -> None:
+            settings[4:6] = [termios.B115200] * 2
+            real(fd, when, settings)
+
+        monkeypatch.setattr("muros.links._terminal.termios.tcsetattr", slower)
+        with pytest.raises(LinkError, match="its driver refuses 4000000 baud"):
+            open_terminal(str(device.path), 4000000)
+        device.pull()
+
     def test_every_baud_rate_of_upstream_agents_is_known(self) -> None:
         upstream = (
             "50 75 110 134 150 200 300 600 1200 1800 2400 4800 9600 19200 38400 57600 115200 230400 460800 500000"

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from muros.links import LengthFraming, LinkError, TcpLink
 from muros.xrce.framing import tcp_frame
-from tests.links.rigs import TcpRig, Watcher
+from tests.links.rigs import TcpClient, TcpRig, Watcher
 
 VECTORS = Path(__file__).parents[1] / "vectors" / "xrce"
 
@@ -165,6 +165,50 @@ class TestTcp:
                 assert tries == 1
             await client.send(b"hello")
             assert await client.receive() == b"hello"
+            rig.close()
+
+        asyncio.run(main())
+
+    def test_the_same_peer_through_another_address_replaces_itself(self, tmp_path: Path) -> None:
+        async def main() -> None:
+            link, events = TcpLink(0), Watcher(echo=True)
+            link.open(events)
+            clients: list[TcpClient] = []
+            for host in ("127.0.0.1", "127.0.0.2"):  # different at this end, the same at the other
+                sock = socket.socket()
+                sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                sock.setblocking(False)
+                sock.bind(clients[0].sock.getsockname() if clients else ("127.0.0.3", 0))
+                await asyncio.get_running_loop().sock_connect(sock, (host, link.port))
+                clients.append(TcpClient(sock))
+                await clients[-1].send(b"hello")
+                assert await clients[-1].receive() == b"hello"
+            assert events.gone == [(clients[0].sock.getsockname(), "connection replaced by a new one")]
+            with pytest.raises(ConnectionError):
+                await clients[0].receive()
+            await clients[1].send(b"still here")
+            assert await clients[1].receive() == b"still here"
+            link.close()
+            for client in clients:
+                client.close()
+
+        asyncio.run(main())
+
+    def test_one_that_breaks_while_data_waits_for_it_is_told(self, tmp_path: Path) -> None:
+        async def main() -> None:
+            rig = TcpRig(tmp_path, queue_bytes=100_000)
+            events = Watcher()
+            rig.link.open(events)
+            client = await rig.client()
+            await client.send(b"hello")
+            await events.until(lambda: events.messages)
+            address = events.messages[0][1]
+            while rig.link.send(bytes(20_000), address):
+                pass
+            client.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
+            client.close()
+            await events.until(lambda: events.gone)
+            assert rig.link.peers == []
             rig.close()
 
         asyncio.run(main())

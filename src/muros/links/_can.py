@@ -96,8 +96,7 @@ class CanLink(DatagramLink):
 
     def _connect(self) -> None:
         self._start(self._bind())
-        if self._events is not None:
-            self._events.on_up(self, self.name)
+        self._up(self.name)
 
     def _bind(self) -> socket.socket:
         where = self.name
@@ -144,13 +143,9 @@ class CanLink(DatagramLink):
         sock.send(can_frame_bytes(int(address), message))  # type: ignore[call-overload]
 
     def _receive_failed(self, error: OSError) -> None:
-        self._down(error.strerror or str(error))
-
-    def _down(self, reason: str) -> None:
         super()._close()
         self._reopen = asyncio.get_running_loop().call_later(self._retry_period, self._look)
-        if self._events is not None:
-            self._events.on_down(self, f"{self.interface}: {reason}")
+        self._down(f"{self.interface}: {error.strerror or error}")
 
     def _look(self) -> None:
         self._reopen = None

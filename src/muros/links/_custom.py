@@ -127,8 +127,7 @@ class CustomLink(Link):
         else:
             self._watched = handle if isinstance(handle, int) else int(handle.fileno())  # type: ignore[attr-defined]
             loop.add_reader(self._watched, self._drained)
-        if self._events is not None:
-            self._events.on_up(self, self._name)
+        self._up(self._name)
 
     def _disconnect(self) -> None:
         if not self._ready:
@@ -201,14 +200,14 @@ class CustomLink(Link):
             self._timer.cancel()
         self._disconnect()
         self._timer = asyncio.get_running_loop().call_later(self._retry, self._reconnect)
-        if self._events is not None:
-            self._events.on_down(self, f"{self._name}: {function} failed ({_words(error)})")
+        self._down(f"{self._name}: {function} failed ({_words(error)})")
 
     def _reconnect(self) -> None:
         self._timer = None
         try:
             self._connect()
         except Exception as error:  # as in send
+            self._disconnect()
             self._problem(_raised("open", error), f"{self._name} is not open")
             if self.is_open:
                 self._timer = asyncio.get_running_loop().call_later(self._retry, self._reconnect)

@@ -9,6 +9,7 @@ dropped, counted in `LinkCounters.dropped` and told through `LinkEvents.on_probl
 
 from __future__ import annotations
 
+import asyncio
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Hashable
@@ -33,7 +34,10 @@ class LinkError(Exception):
 
 
 class LinkEvents(Protocol):
-    """What a link tells its owner, always from the loop's thread. A handler may call the link, also `close` it."""
+    """What a link tells its owner, always from the loop's thread. A handler may call the link, also `close` it.
+
+    What a handler raises goes to the loop's exception handler; the link goes on.
+    """
 
     def on_message(self, link: Link, data: bytes, address: Address) -> None:
         """A whole message came. ``data`` is the receiver's to keep."""
@@ -176,7 +180,35 @@ class Link(ABC):
         counters = self.counters
         counters.received += 1
         counters.received_bytes += len(message)
-        events.on_message(self, message, address)
+        try:
+            events.on_message(self, message, address)
+        except Exception as error:
+            self._owner_failed(error)
+
+    def _up(self, detail: str) -> None:
+        self._tell("on_up", detail)
+
+    def _down(self, reason: str) -> None:
+        self._tell("on_down", reason)
+
+    def _gone(self, address: Address, reason: str) -> None:
+        self._tell("on_gone", address, reason)
+
+    def _problem(self, cause: Cause, what: str, n: int = 1) -> None:
+        self._tell("on_problem", cause.code, what, cause.why, cause.remedy, n)
+
+    def _tell(self, event: str, *details: object) -> None:
+        if self._events is None:
+            return
+        try:
+            getattr(self._events, event)(self, *details)
+        except Exception as error:
+            self._owner_failed(error)
+
+    def _owner_failed(self, error: Exception) -> None:
+        """A handler has raised: said loudly, yet the link goes on, and with it everybody else's messages."""
+        context = {"message": f"{self.name}: a handler of its owner has failed", "exception": error}
+        asyncio.get_running_loop().call_exception_handler(context)
 
     def _drop(self, cause: Cause, size: int, address: Address) -> bool:
         """Counts and tells a message that is not sent; answers False for `send` to return."""
@@ -187,10 +219,6 @@ class Link(ABC):
     def _dropped_incoming(self, cause: Cause, address: Address) -> None:
         self.counters.dropped[cause.code] += 1
         self._problem(cause, f"a message from {self.describe(address)} ignored")
-
-    def _problem(self, cause: Cause, what: str, n: int = 1) -> None:
-        if self._events is not None:
-            self._events.on_problem(self, cause.code, what, cause.why, cause.remedy, n)
 
 
 class Locator(NamedTuple):

@@ -84,10 +84,8 @@ class LineLink(Link):
         del self._ports[port.device]
         port.shut()
         for address in port.addresses.values():
-            if self._events is not None:
-                self._events.on_gone(self, address, reason)
-        if self._events is not None:
-            self._events.on_down(self, reason)
+            self._gone(address, reason)
+        self._down(reason)
 
 
 class Port:

@@ -63,8 +63,7 @@ class PseudoterminalLink(LineLink):
         self._device = os.ttyname(far)
         self._ports[self._device] = Port(self, self._device, near, close)
         self._link_far_end()
-        if self._events is not None:
-            self._events.on_up(self, self.name)
+        self._up(self.name)
 
     def _close(self) -> None:
         super()._close()

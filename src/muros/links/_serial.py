@@ -83,7 +83,7 @@ class SerialLink(LineLink):
             pattern = glob.has_magic(wanted)
             devices = sorted(glob.glob(wanted)) if pattern else [wanted]
             if first and not devices:
-                self._tell(wanted, _absent())
+                self._say_once(wanted, _absent())
             for device in devices:
                 if not self.is_open:  # a handler has closed the link
                     return
@@ -108,19 +108,18 @@ class SerialLink(LineLink):
         try:
             fd = open_terminal(device, self.baud)
         except AbsentError:
-            self._tell(device, _absent())
+            self._say_once(device, _absent())
             return
         except LinkError as error:
             if strict:
                 raise
-            self._tell(device, Cause("port-unusable", error.why, error.remedy))
+            self._say_once(device, Cause("port-unusable", error.why, error.remedy))
             return
         self._told.pop(device, None)
         self._ports[device] = Port(self, device, fd, close_terminal)
-        if self._events is not None:
-            self._events.on_up(self, f"{device} at {self.baud}")
+        self._up(f"{device} at {self.baud}")
 
-    def _tell(self, device: str, cause: Cause) -> None:
+    def _say_once(self, device: str, cause: Cause) -> None:
         """Says once why a port does not open, not at every look."""
         if self._told.get(device) != cause.why:
             self._told[device] = cause.why

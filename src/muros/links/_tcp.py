@@ -89,8 +89,7 @@ class TcpLink(Link):
         self.host, self.port = self._listener.getsockname()[:2]
         self._loop = asyncio.get_running_loop()
         self._loop.add_reader(self._listener, self._accept)
-        if self._events is not None:
-            self._events.on_up(self, self.name)
+        self._up(self.name)
 
     def _close(self) -> None:
         if self._resume is not None:
@@ -122,7 +121,9 @@ class TcpLink(Link):
             if old is not None:  # it came to another address of this host
                 old.channel.stop()
                 self._ended(old, "replaced by a new one")
-            if len(self._connections) >= self._limit:
+            if self._listener is None:  # a handler has closed the link
+                sock.close()
+            elif len(self._connections) >= self._limit:
                 sock.close()
                 self._refuse(address)
             else:
@@ -168,10 +169,8 @@ class TcpLink(Link):
     def _ended(self, connection: _Connection, reason: str) -> None:
         connection.sock.close()
         del self._connections[connection.address]
-        if self._events is not None:
-            known = reason.startswith(("closed", "replaced"))
-            why = f"connection {reason}" if known else f"connection lost ({reason})"
-            self._events.on_gone(self, connection.address, why)
+        known = reason.startswith(("closed", "replaced"))
+        self._gone(connection.address, f"connection {reason}" if known else f"connection lost ({reason})")
 
 
 class _Connection:

@@ -73,8 +73,7 @@ class UdpLink(DatagramLink):
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, self._receive_buffer)
         self.host, self.port = sock.getsockname()[:2]
         self._start(sock)
-        if self._events is not None:
-            self._events.on_up(self, self.name)
+        self._up(self.name)
 
     def _bind(self) -> socket.socket:
         return bound_socket(f"{self.kind}{self.family}", self.family, "udp", self.host, self.port)

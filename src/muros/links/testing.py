@@ -260,7 +260,14 @@ class Endpoint:
             self.inbox.append((data, sender))
 
 
-class SimulatedLink(Link):
+class _TestLink(Link):
+    """What a handler raises reaches the test that caused it."""
+
+    def _owner_failed(self, error: Exception) -> None:
+        raise error
+
+
+class SimulatedLink(_TestLink):
     """A link at ``address`` of a simulated network; its peers are the other endpoints. Needs no asyncio."""
 
     kind: ClassVar[str] = "simulated"
@@ -283,8 +290,7 @@ class SimulatedLink(Link):
 
     def _open(self) -> None:
         self._endpoint = self.network.endpoint(self.address, self._deliver)
-        if self._events is not None:
-            self._events.on_up(self, self.name)
+        self._up(self.name)
 
     def _close(self) -> None:
         if self._endpoint is not None:
@@ -292,7 +298,7 @@ class SimulatedLink(Link):
             self._endpoint = None
 
 
-class PairLink(Link):
+class PairLink(_TestLink):
     """A link in memory: the test makes its peers and moves messages by calls. Nothing is lost, nothing waits.
 
     ``locators`` is what the link answers for discovery.
@@ -328,8 +334,7 @@ class PairLink(Link):
         return None
 
     def _open(self) -> None:
-        if self._events is not None:
-            self._events.on_up(self, self.name)
+        self._up(self.name)
 
     def _close(self) -> None:
         """Nothing to free: the peers stay, as hosts on a network would."""
@@ -354,8 +359,7 @@ class Peer:
     def leave(self, reason: str = "connection closed by the far end") -> None:
         """Goes away as a closed connection does: the link's owner is told, sending here fails."""
         self.link._peers.pop(self.address, None)
-        if self.link._events is not None:
-            self.link._events.on_gone(self.link, self.address, reason)
+        self.link._gone(self.address, reason)
 
 
 @dataclass
