@@ -190,6 +190,25 @@ class TestUdp:
 
         asyncio.run(main())
 
+    def test_what_the_kernel_threw_away_is_counted_and_told(self) -> None:
+        async def main() -> None:
+            link = UdpLink(0, "127.0.0.1", receive_buffer=4096)
+            events = Watcher()
+            link.open(events)
+            sock, _ = receiver()
+            for _ in range(50):
+                sock.sendto(bytes(1000), ("127.0.0.1", link.port))
+            await events.until(lambda: events.problems)
+            ((code, what, _, remedy, n),) = events.problems
+            assert (code, what) == ("receive-buffer-full", f"messages to {link.name} lost")
+            assert "net.core.rmem_max" in remedy
+            assert n == link.counters.dropped[code] == 50 - len(events.messages)
+            assert 0 < len(events.messages) < 50
+            sock.close()
+            link.close()
+
+        asyncio.run(main())
+
     def test_an_empty_datagram_is_no_message(self) -> None:
         async def main() -> None:
             link = UdpLink(0, "127.0.0.1")

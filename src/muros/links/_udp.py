@@ -27,6 +27,16 @@ RECEIVE_BUFFER_BYTES = 4 << 20
 JOIN_PERIOD_S = 5.0
 """How often a discovery link looks for network interfaces that have come up, in seconds."""
 
+OVERFLOW = Cause(
+    "receive-buffer-full",
+    "they came faster than they could be handled, and the socket's buffer was full",
+    "Allow a larger buffer: sudo sysctl net.core.rmem_max=8388608; or send less often.",
+)
+
+_SO_RCVBUFFORCE = 33
+_SO_MEMINFO = 55
+_MEMINFO = struct.Struct("=9I")
+_MEMINFO_DROPS = 8
 _LARGEST = {4: 65507, 6: 65527}
 _RECEIVE_BYTES = 65536
 
@@ -57,6 +67,7 @@ class UdpLink(DatagramLink):
         self.family = family
         self.mtu = _LARGEST[family]
         self._receive_buffer = receive_buffer
+        self._overflown = 0
 
     @property
     def name(self) -> str:
@@ -70,13 +81,24 @@ class UdpLink(DatagramLink):
 
     def _open(self) -> None:
         sock = self._bind()
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, self._receive_buffer)
+        _enlarge(sock, self._receive_buffer)
+        self._overflown = 0
         self.host, self.port = sock.getsockname()[:2]
         self._start(sock)
         self._up(self.name)
 
     def _bind(self) -> socket.socket:
         return bound_socket(f"{self.kind}{self.family}", self.family, "udp", self.host, self.port)
+
+    def _readable(self) -> None:
+        super()._readable()
+        if self._socket is not None:
+            overflown = _overflown(self._socket)
+            if overflown != self._overflown:
+                n = (overflown - self._overflown) & 0xFFFF_FFFF
+                self._overflown = overflown
+                self.counters.dropped[OVERFLOW.code] += n
+                self._problem(OVERFLOW, f"messages to {self.name} lost", n)
 
     def _receive(self, sock: socket.socket) -> tuple[bytes, SocketAddress]:
         return sock.recvfrom(_RECEIVE_BYTES)
@@ -182,3 +204,20 @@ def _describe(address: Address) -> str:
     if isinstance(address, tuple) and len(address) >= 2:
         return join(str(address[0]), int(address[1]))
     return str(address)
+
+
+def _enlarge(sock: socket.socket, size: int) -> None:
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, size)  # beyond net.core.rmem_max, for root
+    except OSError:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, size)
+
+
+def _overflown(sock: socket.socket) -> int:
+    """Datagrams that the kernel has thrown away because the socket's buffer was full; counts modulo 2**32."""
+    try:
+        return int(
+            _MEMINFO.unpack(sock.getsockopt(socket.SOL_SOCKET, _SO_MEMINFO, _MEMINFO.size))[_MEMINFO_DROPS]
+        )
+    except (OSError, struct.error):  # a kernel that does not tell
+        return 0
