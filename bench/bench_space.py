@@ -141,7 +141,7 @@ def session_size(*, touch: bool) -> float:
 
 def _session(space: Space, i: int, touch: bool) -> object:
     participant = space.participant(f"board{i}", key=i.to_bytes(4, "little"), owner=f"client 0x{i:08X}")
-    topic = Topic(f"rt/board{i}/temperature", "std_msgs::msg::dds_::Int32_" + "")
+    topic = Topic(f"rt/board{i}/temperature", "std_msgs::msg::dds_::Int32_")
     writer = participant.writer(topic, Qos(depth=10), key=0x15)
     reader = participant.reader(topic, Qos(depth=10), key=0x16)
     if touch:

@@ -852,6 +852,22 @@ class SpaceConformance:
         self.settle(space)
         assert [(f.code, f.who) for f in told] == [("reply-unmatched", "/server")]
 
+    def test_a_reply_cut_short_reaches_nobody(self, space: Space) -> None:
+        """Whoever writes on the topic of replies: what does not name a request is for no client."""
+        requester = space.participant("client").requester(ADD)
+        writer = space.participant("stranger").writer(Topic(ADD.reply_topic, ADD.reply_type))
+        self.settle(space)
+        assert writer.matched
+        for related in (None, requester.gid, requester.gid + bytes(7), bytes(24)):
+            writer.write(b"x", related=related)
+        self.settle(space)
+        assert requester.take() is None
+        writer.write(b"y", related=identity_of(requester.gid, 7))
+        self.settle(space)
+        reply = requester.take()
+        assert reply is not None
+        assert (reply.sequence, reply.data) == (7, b"y")
+
     def test_a_reply_to_a_client_that_has_gone(self, space: Space) -> None:
         requester = space.participant("client").requester(ADD)
         replier = space.participant("server").replier(ADD)

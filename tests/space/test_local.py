@@ -1,9 +1,11 @@
 """The local engine: the contract of all engines, and what is its own."""
 
 from collections.abc import Callable
+from functools import partial
 
 import pytest
 
+from bench.bench_space import session_size
 from muros.findings import Finding, Findings
 from muros.space import (
     ClosedError,
@@ -321,6 +323,50 @@ class TestOrder:
                 space.tick()
             assert order == [0, 1, 2]
 
+    def test_who_waits_is_called_when_there_is_plenty_or_no_patience_left(self, clock: Clock) -> None:
+        with open_space(clock=clock, resource_limit=2) as space:
+            node = space.participant("node")
+            reader = node.reader(CHATTER, KEEP_ALL)
+            writers = [node.writer(CHATTER, KEEP_ALL) for _ in range(4)]
+            called: list[int] = []
+            for i, writer in enumerate(writers):
+                writer.on_room = partial(called.append, i)
+
+            def all_wait() -> None:
+                while writers[0].write(b"x"):
+                    pass
+                assert not any(writer.write(b"x") for writer in writers)
+                called.clear()
+
+            all_wait()
+            reader.take()
+            space.tick()
+            assert called == [0], "room for one"
+            reader.take()
+            space.tick()
+            assert called == [0, 1, 2, 3], "room for all"
+            all_wait()
+            clock.now += 100 * MS
+            space.tick()
+            assert called == [0, 1, 2, 3], "no patience left"
+            before = reader.lost
+            assert all(writer.write(b"x") for writer in writers)
+            assert reader.lost == before + 4
+            reader.close()
+            assert space.tick() is not None, "the summary of the finding"
+            clock.now += 60 * SECOND
+            assert space.tick() is None, "no timer is left"
+
+    def test_a_full_reader_that_closes_leaves_no_timer(self, clock: Clock) -> None:
+        with open_space(clock=clock, resource_limit=1) as space:
+            node = space.participant("node")
+            reader, writer = node.reader(CHATTER, KEEP_ALL), node.writer(CHATTER, KEEP_ALL)
+            assert writer.write(b"1")
+            assert not writer.write(b"2")
+            assert space.tick() == clock.now + 100 * MS
+            reader.close()
+            assert space.tick() is None
+
     def test_a_steady_competitor_does_not_starve_a_writer(self, clock: Clock) -> None:
         """Patience counts from a writer's own first refusal, whoever wins the room in between."""
         with open_space(clock=clock, resource_limit=1) as space:
@@ -388,7 +434,8 @@ class TestBounds:
         told: list[Finding] = []
         with open_space(clock=clock, resource_limit=10) as space:
             space.findings.on_finding(told.append)
-            writer = space.participant("w").writer(CHATTER, RELIABLE)
+            writer = space.participant("w").writer(CHATTER, Qos(depth=1000))
+            assert told == [], "a volatile writer holds nothing"
             reader = space.participant("r").reader(CHATTER, Qos(depth=65535))
             assert [f.code for f in told] == ["depth-limited"]
             for i in range(20):
@@ -425,6 +472,13 @@ class TestBounds:
                     p.replier(ADD)
             (domain,) = space._domains.values()
             assert (domain.topics, domain.endpoints, domain.participants) == ({}, {}, {})
+            for i in range(1000):
+                space.participant("tourist", domain=i).close()
+            assert len(space._domains) == 1
+
+    def test_a_fleet_is_lean(self) -> None:
+        assert session_size(touch=False) < 2000
+        assert session_size(touch=True) < 3000
 
     def test_a_closed_writer_says_so(self) -> None:
         with open_space() as space:

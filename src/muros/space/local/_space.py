@@ -59,6 +59,8 @@ class LocalSpace(Closing):
         number = self.domain if domain is None else domain
         home = self._domains.get(number)
         if home is None:
+            for empty in [n for n, d in self._domains.items() if not d.participants]:
+                del self._domains[empty]
             home = self._domains[number] = Domain(number)
         prefix = self._next_prefix() if key is None else _prefix_of(key)
         if (holder := home.participants.get(prefix)) is not None:

@@ -15,7 +15,7 @@ from muros.findings import Severity
 from muros.space._door import ClosedError
 from muros.space._graph import Role
 from muros.space._qos import Durability, Qos
-from muros.space._values import CDR_LE, GID_SIZE, Sample, Topic
+from muros.space._values import CDR_LE, GID_SIZE, IDENTITY_SIZE, Sample, Topic
 from muros.space.local._endpoint import LocalEndpoint
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ class LocalWriter(LocalEndpoint):
         for reader in self.readers:
             reader.arrive(sample)
         if sample.related is not None and (self.clients is not None or self.service):
-            client = None if self.clients is None else self.clients.get(bytes(sample.related[:GID_SIZE]))
+            client = self._client(sample.related)
             found = client is not None
             if client is not None:
                 client.arrive(sample)
@@ -186,6 +186,12 @@ class LocalWriter(LocalEndpoint):
         self.history = None
         self.on_room = None
         self.special = True
+
+    def _client(self, identity: bytes) -> LocalReader | None:
+        """The reader of replies that a reply to `identity` is for."""
+        if self.clients is None or len(identity) != IDENTITY_SIZE:
+            return None
+        return self.clients.get(bytes(identity[:GID_SIZE]))
 
     def _classify(self) -> None:
         """Recompute which path `write` takes."""

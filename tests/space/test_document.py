@@ -1,0 +1,62 @@
+"""What docs/space.md shows works, and its table of findings is whole."""
+
+import asyncio
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from muros.space import Durability, Qos, Topic, open_space
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs/space.md").read_text()
+PROGRAMS = re.findall(r"^```python\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
+SHOWN = ["10 bytes, number 1\n", "1 b'24 and 42'\n", "", "Appeared\n"]
+
+
+def run(program: str) -> dict[str, Any]:
+    """Run a program of the document; returns its names."""
+    names: dict[str, Any] = {}
+    exec(compile(program, "docs/space.md", "exec"), names)
+    return names
+
+
+@pytest.mark.parametrize(("program", "shown"), list(zip(PROGRAMS, SHOWN, strict=True)))
+def test_programs_work(program: str, shown: str, capsys: pytest.CaptureFixture[str]) -> None:
+    run(program)
+    assert capsys.readouterr().out == shown
+
+
+def test_the_shown_driver_drives() -> None:
+    (program,) = (p for p in PROGRAMS if "def drive" in p)
+    drive = run(program)["drive"]
+    latched = Qos(durability=Durability.TRANSIENT_LOCAL)
+    topic = Topic("rt/a", "T")
+
+    async def main() -> None:
+        done = asyncio.Event()
+        with open_space() as space:
+            drive(space, asyncio.get_running_loop())
+            node = space.participant("node")
+            node.writer(topic, latched).write(b"x")
+            node.reader(topic, latched, lambda reader: done.set())
+            await done.wait()
+            late = asyncio.Event()
+            writer = node.writer(topic, Qos(deadline=1_000_000))
+            writer.on_deadline = late.set
+            writer.write(b"x")
+            await late.wait()
+            assert writer.deadline_missed
+
+    asyncio.run(main())
+
+
+def test_all_codes_of_findings_are_in_the_table() -> None:
+    table = set(re.findall(r"^\| `([a-z-]+)` \|", TEXT, re.MULTILINE))
+    source = "\n".join(path.read_text() for path in (ROOT / "src/muros/space").rglob("*.py"))
+    used = set(re.findall(r"\"([a-z]+(?:-[a-z]+)+)\"", source)) | {
+        "reader-deadline-missed",
+        "writer-deadline-missed",
+    }
+    assert table == used
