@@ -26,11 +26,14 @@ class Joiner:
         self.whole = False
         self.at = 0  # where handling goes on in data
         self.too_long = 0  # bytes of a submessage that is being passed over
+        self.torn = False  # a piece of the submessage was given up by its sender
 
     def add(self, buf: "Buffer", off: int, n: int, last: int) -> bool:
         """Takes a piece; whether ``data`` is now a whole submessage."""
         if self.whole:
             return True  # asked again about the same last piece
+        if self.torn:
+            return False
         if self.too_long or len(self.data) + n > self.limit:
             self.too_long += len(self.data) + n
             self.data = bytearray()
@@ -45,6 +48,13 @@ class Joiner:
         self.whole = False
         self.at = 0
         self.too_long = 0
+        self.torn = False
+
+    def tear(self) -> None:
+        """Messages are missing now: a submessage that has begun is passed over to its end."""
+        torn = self.torn or self.too_long > 0 or (len(self.data) > 0 and not self.whole)
+        self.clear()
+        self.torn = torn
 
 
 class Cutter:

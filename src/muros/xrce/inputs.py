@@ -58,7 +58,8 @@ class ReliableInput:
         self.expected = 0  # the number handled next
         self.end = 0  # behind the highest number seen or announced
         self.fragments: "Joiner | None" = None  # once a fragment came
-        self.resume_at = 0  # where handling of a held message goes on
+        self.resume_at = 0  # where handling of the expected message goes on, if it is held
+        self.busy = False  # a message of it is being handled
         self.stored = 0  # bit i: message expected + i is kept
         self._mtu = mtu
         self._make(mtu, window)
@@ -88,6 +89,7 @@ class ReliableInput:
     def advance(self) -> bool:
         """The expected message is handled. Whether the next one is kept, as ``ready`` says."""
         self.stored >>= 1
+        self.resume_at = 0
         self.expected = self.expected + 1 & 0xFFFF
         if self.end - self.expected & 0x8000:
             self.end = self.expected
@@ -108,7 +110,9 @@ class ReliableInput:
         if 0 < skip < 0x8000:
             self.stored >>= skip
             self.expected = first
-            self.fragments = None
+            self.resume_at = 0
+            if self.fragments is not None:
+                self.fragments.tear()
             if self.end - first & 0x8000:
                 self.end = first
         ahead = last + 1 - self.expected & 0xFFFF
@@ -126,7 +130,8 @@ class ReliableInput:
 
     def reset(self) -> None:
         """Expects number 0 again; kept messages are dropped."""
-        self.expected = self.end = self.stored = 0
+        self.expected = self.end = self.stored = self.resume_at = 0
+        self.busy = False
         self.fragments = None
 
     def _make(self, mtu: int, window: int) -> None:

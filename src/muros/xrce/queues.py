@@ -1,7 +1,7 @@
 """The reliable streams of a host with many sessions: messages are bytes, held only while they wait.
 
-Same rules and numbers as in ``outputs`` and ``inputs``; a session that is idle holds nothing. A sender may be given more
-than its window: the rest waits in order, so that nothing accepted is lost.
+Same rules and numbers as in ``outputs`` and ``inputs``; a session that is idle holds nothing. A sender may be given
+more than its window: the rest waits in order, so that nothing accepted is lost.
 """
 
 from collections import deque

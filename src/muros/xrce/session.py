@@ -57,6 +57,7 @@ class SessionCore:
         self.outputs: "dict[int, Any]" = {}
         self.now = 0
         self.malformed = 0
+        self.foreign = 0  # acknowledgements in a row of what was never sent
         self.largest = largest
         self._handle = handle
         self._control = bytearray(len(self.head) + _HEAD + _LONGEST_CONTROL)
@@ -79,8 +80,10 @@ class SessionCore:
         number = buf[off + 2] | buf[off + 3] << 8
         what = stream.accept(number)
         if stream.reliable:
-            if what == 1:
+            if what == 1 and not stream.stored & 1:
                 self._in_order(stream, buf, off, size, n)
+            elif what == 1:
+                self._go_on(stream)  # it is held: a part of it may be handled already
             elif what == 2:
                 stream.store(number, buf, off, n)
             self._acknack(stream_id, stream.expected, stream.missing())
@@ -91,9 +94,9 @@ class SessionCore:
     def resume(self, stream_id: int, now: int) -> None:
         """Goes on with a stream that was held by ``LATER``."""
         stream = self.inputs.get(stream_id)
-        if stream is not None and stream.reliable and stream.ready():
+        if stream is not None and stream.reliable and stream.stored & 1 and not stream.busy:
             self.now = now
-            self._in_order(stream, stream.buf, stream.base, stream.resume_at, stream.size)
+            self._go_on(stream)
             self._acknack(stream_id, stream.expected, stream.missing())
 
     def flush(self, now: int) -> None:
@@ -153,20 +156,40 @@ class SessionCore:
         return None
 
     def _in_order(self, stream: "Any", buf: "Buffer", off: int, at: int, n: int) -> None:
-        size = len(self.head)
-        while True:
-            held = self._submessages(buf, off, off + at, off + n, stream.stream_id, stream)
-            if held != _DONE:
-                if not stream.stored & 1:
-                    stream.store(stream.expected, buf, off, n)
-                stream.resume_at = held - off
-                return
-            if not stream.advance():
-                return
-            buf = stream.buf
-            off = stream.base
-            n = stream.size
-            at = size
+        """Handles the expected message from ``at`` on, and those kept behind it. What a submessage sets off may lead
+        back here; the outer call goes on then."""
+        if stream.busy:
+            return
+        stream.busy = True
+        try:
+            while True:
+                number = stream.expected
+                held = self._submessages(buf, off, off + at, off + n, stream.stream_id, stream)
+                if not stream.busy:
+                    return  # a submessage has reset the streams: number 0 comes next
+                if stream.expected != number:
+                    more = stream.ready()  # a HEARTBEAT in the message gave it up
+                elif held != _DONE:
+                    if not stream.stored & 1:
+                        stream.store(number, buf, off, n)
+                    stream.resume_at = held - off
+                    return
+                else:
+                    more = stream.advance()
+                if not more:
+                    return
+                buf = stream.buf
+                off = stream.base
+                n = stream.size
+                at = len(self.head)
+        finally:
+            stream.busy = False
+
+    def _go_on(self, stream: "Any") -> None:
+        """Handles the expected message, which is kept, from where it was held."""
+        if stream.ready():
+            at = stream.resume_at or len(self.head)
+            self._in_order(stream, stream.buf, stream.base, at, stream.size)
 
     def _acknack(self, stream_id: int, first: int, bitmap: int) -> None:
         at = self.control(_ACKNACK, 5)
@@ -225,7 +248,10 @@ class SessionCore:
         if stream is None or not stream.reliable:
             return
         first = buf[at] | buf[at + 1] << 8 if flags & _LITTLE_ENDIAN else buf[at] << 8 | buf[at + 1]
-        if not stream.acknowledge(first, buf[at + 2] << 8 | buf[at + 3], self.send, self.now):
+        if stream.acknowledge(first, buf[at + 2] << 8 | buf[at + 3], self.send, self.now):
+            self.foreign = 0
+        else:
+            self.foreign += 1
             self.malformed += 1
 
     def _on_heartbeat(self, buf: "Buffer", at: int, flags: int) -> None:
@@ -244,13 +270,8 @@ class SessionCore:
             last = buf[at + 2] << 8 | buf[at + 3]
         stream.announce(first, last)
         if stream.stored & 1:
-            self.resume_skipped(stream)
+            self._go_on(stream)
         self._acknack(stream_id, stream.expected, stream.missing())
-
-    def resume_skipped(self, stream: "Any") -> None:
-        """A HEARTBEAT gave up a hole: what is kept behind it is handled now."""
-        if stream.ready():
-            self._in_order(stream, stream.buf, stream.base, len(self.head), stream.size)
 
     def _on_fragment(self, stream: "Any", buf: "Buffer", at: int, n: int, last: int) -> bool:
         """Takes a piece; whether the joined submessage has to wait."""
@@ -267,7 +288,8 @@ class SessionCore:
                 return True
         elif last:
             self.malformed += 1
-            self.too_long(stream.stream_id, joiner.too_long)
+            if joiner.too_long:
+                self.too_long(stream.stream_id, joiner.too_long)
         if last:
             joiner.clear()
         return False
