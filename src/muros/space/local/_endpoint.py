@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Self, TypeVar
 
 from muros.space._graph import Endpoint, Role
 from muros.space._qos import Qos, duration
@@ -15,7 +15,9 @@ from muros.space.local._timers import Timer
 if TYPE_CHECKING:
     from muros.space.local._participant import LocalParticipant
 
-__all__ = ["Closing", "DeadlineWatch", "LocalEndpoint"]
+__all__ = ["Closing", "DeadlineWatch", "LocalEndpoint", "without"]
+
+_T = TypeVar("_T")
 
 
 class Closing:
@@ -167,3 +169,9 @@ class DeadlineWatch:
         endpoint = self._endpoint
         if endpoint.on_deadline is not None and not endpoint.closed:
             endpoint.core.call(endpoint.owner, endpoint.on_deadline)
+
+
+def without(items: tuple[_T, ...], item: _T) -> tuple[_T, ...]:
+    """`items` less `item`, which is among them."""
+    i = items.index(item)
+    return items[:i] + items[i + 1 :]

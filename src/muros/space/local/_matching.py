@@ -7,7 +7,7 @@ from functools import partial
 from muros.space._graph import Incompatible, Matched, Unmatched
 from muros.space._qos import Mismatch, mismatches
 from muros.space.local._core import Core
-from muros.space.local._endpoint import LocalEndpoint
+from muros.space.local._endpoint import LocalEndpoint, without
 from muros.space.local._reader import LocalReader
 from muros.space.local._writer import LocalWriter
 
@@ -39,12 +39,12 @@ class TopicRecord:
         """`endpoint` goes: those it was matched with lose it."""
         core = endpoint.core
         if isinstance(endpoint, LocalWriter):
-            self.writers = tuple(writer for writer in self.writers if writer is not endpoint)
+            self.writers = without(self.writers, endpoint)
             for reader in endpoint.all_readers():
                 endpoint.disconnect(reader)
                 _tell_unmatched(core, endpoint, reader)
         elif isinstance(endpoint, LocalReader):
-            self.readers = tuple(reader for reader in self.readers if reader is not endpoint)
+            self.readers = without(self.readers, endpoint)
             for writer in self.writers:
                 if writer.reaches(endpoint):
                     writer.disconnect(endpoint)

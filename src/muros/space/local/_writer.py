@@ -16,7 +16,7 @@ from muros.space._door import ClosedError
 from muros.space._graph import Role
 from muros.space._qos import Durability, Qos
 from muros.space._values import CDR_LE, GID_SIZE, IDENTITY_SIZE, Sample, Topic
-from muros.space.local._endpoint import LocalEndpoint
+from muros.space.local._endpoint import LocalEndpoint, without
 
 if TYPE_CHECKING:
     from muros.space.local._participant import LocalParticipant
@@ -151,6 +151,7 @@ class LocalWriter(LocalEndpoint):
             self.clients = {**(self.clients or {}), client: reader}
         else:
             self.readers += (reader,)
+        self.may_block = self.may_block or reader.pressure is not None
         self._classify()
         if self.history and reader.qos.durability:
             now = self.core.timers.now()
@@ -164,7 +165,9 @@ class LocalWriter(LocalEndpoint):
         if client:
             self.clients = {k: r for k, r in (self.clients or {}).items() if r is not reader} or None
         else:
-            self.readers = tuple(r for r in self.readers if r is not reader)
+            self.readers = without(self.readers, reader)
+        if reader.pressure is not None:
+            self.may_block = any(r.pressure is not None for r in self.readers)
         self._classify()
 
     def reaches(self, reader: LocalReader) -> bool:
@@ -196,7 +199,6 @@ class LocalWriter(LocalEndpoint):
     def _classify(self) -> None:
         """Recompute which path `write` takes."""
         qos = self.qos
-        self.may_block = any(reader.pressure is not None for reader in self.readers)
         self.special = bool(
             self.closed
             or self.may_block
