@@ -8,10 +8,10 @@ header, so such a client may change its address, and several may share a line.
 """
 
 from collections.abc import Callable, Hashable
-from heapq import heappop, heappush
-from itertools import count
+from functools import partial
 from typing import Any, Protocol
 
+from muros.agent._calls import Call, Calls
 from muros.agent._limits import Limits
 from muros.agent._messages import (
     CreateClient,
@@ -144,8 +144,7 @@ class AgentCore:
         self._ports: list[Port] = []
         self._fresh: set[AgentSession] = set()
         self._watched: set[AgentSession] = set()
-        self._calls: list[tuple[int, int, Callable[[], object]]] = []
-        self._call_number = count()
+        self._calls = Calls()
         self._attempts: dict[tuple[bytes, str], int] = {}
         self._heartbeat_at = 0
         self._liveliness_at = 0
@@ -169,7 +168,7 @@ class AgentCore:
     def detach(self, port: Port, now: int) -> None:
         """The link is closed for good: its clients go."""
         self.now = now
-        for session in list(port.sessions.values()):
+        for session in [session for session in self.clients.values() if session.port is port]:
             self.remove(session, "its link was closed")
         self._ports.remove(port)
 
@@ -187,7 +186,9 @@ class AgentCore:
             keep = self.limits.keep_lost
             self.tell(ClientLost(session.number, reason, None if keep is None else keep / 1000))
             if keep is not None:
-                self.call_at(now + keep, lambda session=session: self._give_up(session))  # type: ignore[misc]
+                session.given_up = self.call_at(
+                    now + keep, partial(self.remove, session, "it did not come back")
+                )
 
     # Time
 
@@ -195,15 +196,15 @@ class AgentCore:
         """Does what is due; returns when to call again (ms), None: when asked to through ``on_wake``."""
         self.now = now
         self._next = None
-        while self._calls and self._calls[0][0] <= now:
-            heappop(self._calls)[2]()
+        self._calls.run(now)
         self._heartbeats(now)
         self._probe(now)
         self._forget_silent(now)
         self._ready(now)
-        if self._attempts:
-            self._attempts = {key: until for key, until in self._attempts.items() if until > now}
-        waits = [self._calls[0][0]] if self._calls else []
+        while self._attempts and (oldest := next(iter(self._attempts.items())))[1] <= now:
+            del self._attempts[oldest[0]]
+        due = self._calls.next()
+        waits = [] if due is None else [due]
         if self.unacknowledged or self._fresh:
             waits.append(now + _TICK)
         if self._watched:
@@ -211,14 +212,19 @@ class AgentCore:
         if self.limits.forget_silent is not None and self.clients:
             waits.append(self._silence_at)
         if self._attempts:
-            waits.append(min(self._attempts.values()))
+            waits.append(next(iter(self._attempts.values())))
         self._next = min(waits) if waits else None
         return self._next
 
-    def call_at(self, tick: int, call: Callable[[], object]) -> None:
-        """Calls ``call`` at ``tick``."""
-        heappush(self._calls, (tick, next(self._call_number), call))
+    def call_at(self, tick: int, call: Callable[[], object]) -> Call:
+        """Calls ``call`` at ``tick``, unless it is cancelled."""
+        made = self._calls.at(tick, call)
         self._wake(tick)
+        return made
+
+    def cancel(self, call: Call) -> None:
+        """It is not called. Cancelling twice, or what was called, is allowed."""
+        self._calls.cancel(call)
 
     def _wake(self, tick: int) -> None:
         if self._next is None or tick < self._next:
@@ -288,11 +294,6 @@ class AgentCore:
                 )
             )
 
-    def _give_up(self, session: AgentSession) -> None:
-        keep = self.limits.keep_lost or 0
-        if session.lost_at is not None and self.now - session.lost_at >= keep:
-            self.remove(session, "it did not come back")
-
     # Sessions
 
     def remove(self, session: AgentSession, reason: str) -> None:
@@ -304,11 +305,19 @@ class AgentCore:
         self._fresh.discard(session)
         self._watched.discard(session)
         if session.attempt:
-            self._attempts[session.key, session.attempt] = self.now + _ATTEMPT_MEMORY
-            self._wake(self.now + _ATTEMPT_MEMORY)
+            self._remember(session)
         session.close()
         self.findings.forget(session.who)
         self.tell(ClientGone(session.number, session.head[0], reason))
+
+    def _remember(self, session: AgentSession) -> None:
+        """A CREATE_CLIENT of this attempt that comes late is known as a repetition; the oldest stand first."""
+        attempts = self._attempts
+        attempts.pop((session.key, session.attempt), None)
+        attempts[session.key, session.attempt] = self.now + _ATTEMPT_MEMORY
+        if len(attempts) > self.limits.max_clients:
+            del attempts[next(iter(attempts))]
+        self._wake(self.now + _ATTEMPT_MEMORY)
 
     def logout(self, session: AgentSession, ids: bytes) -> None:
         """The client says goodbye."""
@@ -370,6 +379,8 @@ class AgentCore:
         self, session: AgentSession, kind: int, flags: int, buf: Buffer, off: int, n: int, stream_id: int
     ) -> int:
         """Submessages of a session that are not about its entities."""
+        if session.closed:
+            return FAILED  # the rest of a message in which it said goodbye
         if kind == GET_INFO and n >= 4:
             session.answer_control(info(bytes(buf[off : off + 4]), 1, []))
         elif kind == TIMESTAMP and n >= 8:
@@ -432,9 +443,11 @@ class AgentCore:
         session._pump_all()
 
     def _replace_neighbour(self, port: Port, address: Hashable, asked: CreateClient) -> None:
-        """A client without key in its headers ends whoever had its address (several with keys may share it)."""
+        """A client without key in its headers has its address for itself; several with keys may share one."""
         neighbour = port.sessions.get(address)
-        if neighbour is not None and neighbour.key != asked.key and asked.session_id >= 0x80:
+        if neighbour is None or neighbour.key == asked.key:
+            return
+        if asked.session_id >= 0x80 or neighbour.head[0] >= 0x80:
             self.remove(neighbour, f"client 0x{asked.key.hex().upper()} took its address")
 
     def _connect(self, port: Port, address: Hashable, asked: CreateClient, attempt: str) -> None:
@@ -452,7 +465,7 @@ class AgentCore:
     ) -> None:
         away = (self.now - (session.heard if session.lost_at is None else session.lost_at)) / 1000
         session.attempt = attempt
-        session.lost_at = None
+        session.here()
         self._rebind(session, port, address)
         self._configure(session, asked)
         session.restart()

@@ -81,11 +81,15 @@ def resolve(variant: Variant, references: References) -> Entity | None:
         raise Refused(STATUS_ERR_DDS_ERROR, f"its XML is refused: {error}", "Correct the document.") from None
 
 
-def same(proxy: Proxy, entity: Entity | None, domain: int | None, objects: dict[int, Proxy]) -> bool:
+def same(
+    proxy: Proxy, entity: Entity | None, domain: int | None, objects: dict[int, Proxy], default_domain: int
+) -> bool:
     """Whether ``entity`` describes what ``proxy`` already is, so that it may be used again."""
     if isinstance(proxy, ParticipantProxy) and isinstance(entity, ParticipantEntity):
         old = proxy.entity
-        return isinstance(old, ParticipantEntity) and old.name == entity.name and proxy.domain == domain
+        if not isinstance(old, ParticipantEntity) or old.name != entity.name:
+            return False
+        return proxy.domain == _domain(domain, entity, default_domain)
     if isinstance(proxy, TopicProxy) and isinstance(entity, TopicEntity):
         return proxy.topic == Topic(entity.name, entity.type_name or "")
     if isinstance(proxy, GroupProxy):
@@ -161,9 +165,7 @@ def _participant(
     client_key: bytes,
     default_domain: int,
 ) -> ParticipantProxy:
-    domain = variant.domain or 0
-    if domain == PROFILE_DOMAIN:
-        domain = default_domain if entity.domain is None else entity.domain
+    domain = _domain(variant.domain, entity, default_domain)
     name = entity.name or DEFAULT_PARTICIPANT
     namespace, _, node = name.rpartition("/")
     key = client_key + object_id.to_bytes(2, "big")
@@ -174,6 +176,12 @@ def _participant(
     except ValueError:  # the old one of this id lives on for its endpoints
         participant = space.participant(node, **options)  # type: ignore[arg-type]
     return ParticipantProxy(object_id, entity, participant, domain, name)
+
+
+def _domain(asked: int | None, entity: ParticipantEntity, default_domain: int) -> int:
+    if asked != PROFILE_DOMAIN:
+        return asked or 0
+    return default_domain if entity.domain is None else entity.domain
 
 
 def _topic(

@@ -7,6 +7,17 @@ from muros.xrce.constants import AGENT_DEAD_TIME_MS, AGENT_HEARTBEAT_MS, AGENT_W
 __all__ = ["Limits"]
 
 
+_AT_LEAST_ONE = (
+    "heartbeat",
+    "dead_time",
+    "max_clients",
+    "max_objects",
+    "max_streams",
+    "max_sample",
+    "max_waiting",
+)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """The limits of an agent; times in milliseconds, sizes in bytes. They are checked at use."""
@@ -35,6 +46,9 @@ class Limits:
     foreign clients may not understand."""
     request_history: int = 16
     """Requests and replies kept for a client that does not read them yet."""
+    max_waiting: int = 16_384
+    """Messages that wait for the acknowledgements of a client; beyond that its requests wait too. One large sample to
+    a client with a tiny MTU makes up to 8200."""
     outstanding_requests: int = 1_024
     """Requests of one requester that may wait for their reply; the oldest is given up."""
     stop_at_failure: bool = False
@@ -43,6 +57,6 @@ class Limits:
     def __post_init__(self) -> None:
         if self.window not in (1, 2, 4, 8, 16):
             raise ValueError(f"window is {self.window}: it must be 1, 2, 4, 8 or 16 messages")
-        for name in ("heartbeat", "dead_time", "max_clients", "max_objects", "max_streams", "max_sample"):
+        for name in _AT_LEAST_ONE:
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}: it must be at least 1")

@@ -68,6 +68,7 @@ def parse_create_client_untrusted(data: Buffer, at: int, end: int, little_endian
     InvalidMessage when the message ends too soon.
     """
     order = "<" if little_endian else ">"
+    data = memoryview(data)[:end]  # what follows belongs to somebody else
     try:
         cookie, major, _minor, _vendor, key, session_id, has_properties = struct.unpack_from(
             "4sBB2s4sBB", data, at
@@ -100,6 +101,7 @@ def parse_create_client_untrusted(data: Buffer, at: int, end: int, little_endian
 def parse_read_data_untrusted(data: Buffer, at: int, end: int, little_endian: bool) -> ReadSpecification:
     """The read specification at ``data[at]``, behind request id and object id. Raises InvalidMessage."""
     order = "<" if little_endian else ">"
+    data = memoryview(data)[:end]  # what follows belongs to somebody else
     try:
         stream_id, data_format, has_filter = struct.unpack_from("BBB", data, at)
         at += 3

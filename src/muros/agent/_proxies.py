@@ -8,6 +8,7 @@ endpoint has gone.
 from collections.abc import Callable
 from typing import Protocol
 
+from muros.agent._calls import Call
 from muros.agent._messages import ReadSpecification, data
 from muros.space import Participant, Qos, Reader, Replier, Requester, Service, Topic, Writer
 from muros.xrce.constants import (
@@ -53,8 +54,11 @@ class ReadingHost(Protocol):
     def wait_for_room(self, reading: "Reading") -> None:
         """Calls ``reading.pump()`` when its stream has room again."""
 
-    def wait_until(self, tick: int, reading: "Reading") -> None:
-        """Calls ``reading.pump()`` at ``tick``."""
+    def wait_until(self, tick: int, reading: "Reading") -> Call:
+        """Calls ``reading.pump()`` at ``tick``, unless the call is given to ``cancel``."""
+
+    def cancel(self, call: Call) -> None:
+        """The call is not made."""
 
     def sample_too_long(self, reading: "Reading", n: int) -> None:
         """A sample of ``n`` bytes was dropped: it fits neither the stream nor the limits."""
@@ -184,6 +188,7 @@ class Reading:
         "_rate",
         "_tokens",
         "_tokens_at",
+        "_waking",
         "remaining",
         "stream_id",
         "subject",
@@ -211,6 +216,7 @@ class Reading:
         self._pace = specification.min_pace_period
         self._tokens = float(self._rate)
         self._tokens_at = self._next = host.tick
+        self._waking: Call | None = None
 
     @property
     def active(self) -> bool:
@@ -220,6 +226,9 @@ class Reading:
     def stop(self) -> None:
         """Sends no more."""
         self.remaining = 0
+        if self._waking is not None:
+            self._host.cancel(self._waking)
+            self._waking = None
 
     def pump(self) -> None:
         """Sends what can be sent now, and sees to being called again when more can."""
@@ -251,7 +260,7 @@ class Reading:
 
     def _allowed(self, now: int) -> bool:
         if now < self._next:
-            self._host.wait_until(self._next, self)
+            self._wait(self._next)
             return False
         rate = self._rate
         if not rate:
@@ -260,8 +269,12 @@ class Reading:
         self._tokens_at = now
         if self._tokens > 0:
             return True
-        self._host.wait_until(now + max(1, int(-self._tokens * 1000 / rate) + 1), self)
+        self._wait(now + max(1, int(-self._tokens * 1000 / rate) + 1))
         return False
+
+    def _wait(self, tick: int) -> None:
+        if self._waking is None or self._waking.function is None:
+            self._waking = self._host.wait_until(tick, self)
 
 
 class _Readable(Proxy):

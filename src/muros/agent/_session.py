@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from muros.agent._calls import Call
 from muros.agent._create import Refused, build, resolve, same
 from muros.agent._messages import InvalidMessage, parse_read_data_untrusted, status
 from muros.agent._proxies import (
@@ -74,6 +75,8 @@ class AgentSession(SessionCore):
         self.probes = 0
         self.heard = core.now
         self.lost_at: int | None = None
+        self.given_up: Call | None = None
+        self.closed = False
         self.objects: dict[int, Proxy] = {}
         self.created_at = 0
         self.stop_at_failure = core.limits.stop_at_failure
@@ -110,13 +113,24 @@ class AgentSession(SessionCore):
             self.outputs[stream_id].mtu = self.mtu
         self._waiting.clear()
 
+    def here(self) -> None:
+        """There is a way to the client."""
+        self.lost_at = None
+        if self.given_up is not None:
+            self.core.cancel(self.given_up)
+            self.given_up = None
+
     def found(self) -> None:
         """There is a way to the client again: readings go on."""
-        self.lost_at = None
+        self.here()
         self._pump_all()
 
     def close(self) -> None:
-        """Takes everything of the client out of the space."""
+        """Takes everything of the client out of the space. A message that is being handled has no further effect."""
+        self.closed = True
+        self.here()
+        self._handlers = {}
+        self.reset()
         objects, self.objects = self.objects, {}
         for proxy in reversed(list(objects.values())):
             proxy.close()
@@ -156,12 +170,18 @@ class AgentSession(SessionCore):
 
     def wait_for_room(self, reading: Reading) -> None:
         """Calls ``reading.pump()`` when its stream has room again."""
+        if len(self._waiting) > len(self.objects):  # those that were replaced wait for nothing
+            self._waiting = deque(other for other in self._waiting if other.active)
         if reading not in self._waiting:
             self._waiting.append(reading)
 
-    def wait_until(self, tick: int, reading: Reading) -> None:
-        """Calls ``reading.pump()`` at ``tick``."""
-        self.core.call_at(tick, reading.pump)
+    def wait_until(self, tick: int, reading: Reading) -> Call:
+        """Calls ``reading.pump()`` at ``tick``, unless the call is given to ``cancel``."""
+        return self.core.call_at(tick, reading.pump)
+
+    def cancel(self, call: Call) -> None:
+        """The call is not made."""
+        self.core.cancel(call)
 
     def sample_too_long(self, reading: Reading, n: int) -> None:
         """A sample of ``n`` bytes was dropped: it fits neither the stream nor the limits."""
@@ -218,9 +238,9 @@ class AgentSession(SessionCore):
 
     def _on_acknack(self, buf: Buffer, at: int, flags: int) -> None:
         super()._on_acknack(buf, at, flags)
-        waiting = self._waiting
-        for _ in range(len(waiting)):
-            waiting.popleft().pump()
+        waiting, self._waiting = self._waiting, deque()
+        for reading in waiting:
+            reading.pump()
 
     def _send(self, message: bytes) -> None:
         self.port.link.send(message, self.address)
@@ -281,6 +301,8 @@ class AgentSession(SessionCore):
         return self._dropped("unknown-writer", "it has no such writer", "Create the writer first.", buf, off)
 
     def _create(self, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
+        if self._status_must_wait(stream_id):
+            return LATER
         if n < 5:
             return self._malformed("CREATE", "it is cut short")
         ids = bytes(buf[off : off + 4])
@@ -305,8 +327,7 @@ class AgentSession(SessionCore):
                 if not mode:
                     return STATUS_ERR_ALREADY_EXISTS
                 if mode & REUSE:
-                    domain = variant.domain
-                    if same(old, entity, domain, self.objects):
+                    if same(old, entity, variant.domain, self.objects, self.core.default_domain):
                         return STATUS_OK_MATCHED
                     if not mode & REPLACE:
                         return STATUS_ERR_MISMATCH
@@ -341,6 +362,8 @@ class AgentSession(SessionCore):
         return STATUS_OK
 
     def _delete(self, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
+        if self._status_must_wait(stream_id):
+            return LATER
         if n < 4:
             return self._malformed("DELETE", "it is cut short")
         ids = bytes(buf[off : off + 4])
@@ -355,6 +378,8 @@ class AgentSession(SessionCore):
         return HANDLED
 
     def _read_data(self, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
+        if self._status_must_wait(stream_id):
+            return LATER
         if n < 4:
             return self._malformed("READ_DATA", "it is cut short")
         ids = bytes(buf[off : off + 4])
@@ -393,9 +418,28 @@ class AgentSession(SessionCore):
         self.core.tell(EntityDeleted(self.number, proxy.kind, object_id, proxy.detail))
 
     def _status(self, ids: bytes, result: int, stream_id: int) -> None:
-        self.post(
-            STREAM_RELIABLE if stream_id >= STREAM_RELIABLE else STREAM_BEST_EFFORT, status(ids, result)
-        )
+        if stream_id < STREAM_RELIABLE:
+            self.post(STREAM_BEST_EFFORT, status(ids, result))
+        elif not self._is_full():
+            self.post(STREAM_RELIABLE, status(ids, result))
+        else:
+            self.core.report(
+                "status-dropped",
+                who=self.who,
+                what=f"{{n}} answer{{s}} to {self.who} dropped",
+                why=f"it has left {self.core.limits.max_waiting} messages unacknowledged",
+                remedy="Check that the client acknowledges what it gets on stream 0x80.",
+            )
+
+    def _is_full(self) -> bool:
+        """Whether too much waits on the stream that answers go out on."""
+        stream = self.outputs.get(STREAM_RELIABLE)
+        return stream is not None and stream.waiting() >= self.core.limits.max_waiting
+
+    def _status_must_wait(self, stream_id: int) -> bool:
+        """Whether a request on a reliable stream stays unacknowledged until its answer can be kept: it is tried again
+        when the client repeats it or sends a HEARTBEAT."""
+        return stream_id >= STREAM_RELIABLE and self._is_full()
 
     def _refused(self, object_id: int, refused: Refused) -> int:
         name = KIND_NAMES.get(object_id & 0x0F, "object")
