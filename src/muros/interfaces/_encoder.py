@@ -70,6 +70,17 @@ class Code:
         self.indent -= 1
 
 
+def format_text(order: str, chunks: Sequence[str]) -> str:
+    """A ``struct`` format of chunks; equal codes in a row are counted together."""
+    merged: list[tuple[int, str]] = []
+    for chunk in chunks:
+        if merged and merged[-1][1] == chunk and len(chunk) == 1:
+            merged[-1] = (merged[-1][0] + 1, chunk)
+        else:
+            merged.append((1, chunk))
+    return order + "".join(code if count == 1 else f"{count}{code}" for count, code in merged)
+
+
 class Structs:
     """The ``struct.Struct`` constants of a generated module, one for each format."""
 
@@ -77,15 +88,8 @@ class Structs:
         self._names: dict[str, str] = {}
 
     def name(self, order: str, chunks: Sequence[str]) -> str:
-        """The constant for a format; equal codes in a row are counted together."""
-        merged: list[tuple[int, str]] = []
-        for chunk in chunks:
-            if merged and merged[-1][1] == chunk and len(chunk) == 1:
-                merged[-1] = (merged[-1][0] + 1, chunk)
-            else:
-                merged.append((1, chunk))
-        text = order + "".join(code if count == 1 else f"{count}{code}" for count, code in merged)
-        return self._names.setdefault(text, f"_S{len(self._names) + 1}")
+        """The constant for a format."""
+        return self._names.setdefault(format_text(order, chunks), f"_S{len(self._names) + 1}")
 
     def lines(self) -> list[str]:
         return [f'{name} = _Struct("{text}")' for text, name in self._names.items()]

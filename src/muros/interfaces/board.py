@@ -1,0 +1,337 @@
+"""The generator of board classes: packages of small modules that MicroPython and CPython import alike.
+
+``generate(["std_msgs/msg/Int32"], "lib")`` writes ``lib/std_msgs/msg/_Int32.py`` and what it needs, so that a board
+program says ``from std_msgs.msg import Int32`` like any other. Packages load a module when its type is asked for.
+
+What is named gets a full class. Messages that are only nested in others get a class with fields and nothing else, as
+the code of the outer message reads and writes them: that is what makes a type cheap on a heap of some kilobytes.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from muros.interfaces import _model as model
+from muros.interfaces._api import registry as default_registry
+from muros.interfaces._board_code import Memos, read_lines, size_lines, write_lines
+from muros.interfaces._layout import Leaf, Many, Text, leaves
+from muros.interfaces._model import (
+    PRIMITIVES,
+    Field,
+    InterfaceError,
+    Kind,
+    Message,
+    Value,
+    attribute,
+)
+from muros.interfaces._names import KINDS, split_type
+from muros.interfaces._registry import Registry
+
+_HELPERS = ("Fields", "block", "count", "encoded", "ended", "integer", "need", "pad", "put_text", "text")
+
+_PACKAGE = """\
+def __getattr__(name):
+    if name[0] == "_":
+        raise AttributeError(name)
+    try:
+        return getattr(__import__(__name__ + "._" + name, None, None, (name,)), name)
+    except ImportError:
+        raise AttributeError(name)
+"""
+
+
+def generate(
+    names: Iterable[str],
+    folder: str | os.PathLike[str],
+    action_services: bool = False,
+    registry: Registry | None = None,
+) -> list[Path]:
+    """Writes the modules of the named types and of all they need below a folder; returns the files, sorted.
+
+    Types that the folder already has in full stay full. ``action_services`` adds the services and the message that
+    carry an action. Raises :class:`InterfaceError` for unknown types and for ``wstring``, which boards do not do.
+    """
+    root = Path(folder)
+    written: set[Path] = set()
+    for path, text in sources(names, action_services, registry, root).items():
+        target = root / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(text, encoding="utf-8")
+        written.add(target)
+    return sorted(written)
+
+
+def sources(
+    names: Iterable[str],
+    action_services: bool = False,
+    registry: Registry | None = None,
+    present: Path | None = None,
+) -> dict[str, str]:
+    """The modules that :func:`generate` writes: path -> text. ``present``: a folder whose full types stay full."""
+    work = _Work(registry or default_registry(), present)
+    for name in names:
+        work.add(_full_name(work.registry, name), action_services)
+    return work.files()
+
+
+class _Work:
+    """The types to write: which in full, which only as what others hold."""
+
+    def __init__(self, registry: Registry, present: Path | None) -> None:
+        self.registry = registry
+        self._present = present
+        self._modules: dict[str, list[Message]] = {}  # module path -> messages in it
+        self._full: set[str] = set()
+        self._tails: dict[str, list[str]] = {}  # module path -> classes of services and actions
+
+    def add(self, name: str, action_services: bool) -> None:
+        found = self.registry.definition(name)
+        if isinstance(found, Message):
+            self._message(found)
+        elif isinstance(found, model.Service):
+            self._service(found, name)
+        else:
+            for message in (found.goal, found.result, found.feedback):
+                self._message(message, name)
+            parts = {"Goal": found.goal, "Result": found.result, "Feedback": found.feedback}
+            if action_services:
+                self._message(found.feedback_message, name)
+                self._service(found.send_goal, name)
+                self._service(found.get_result, name)
+                parts |= {"FeedbackMessage": found.feedback_message}
+            lines = _holder(name, {key: message.name.split("/")[2] for key, message in parts.items()})
+            if action_services:
+                lines += f"    SendGoal = {_short(name)}_SendGoal\n    GetResult = {_short(name)}_GetResult\n"
+            self._tails.setdefault(_module(name), []).append(lines)
+
+    def files(self) -> dict[str, str]:
+        files: dict[str, str] = {}
+        for path, messages in self._modules.items():
+            files[path] = self._source(path, messages)
+            package, kind, _ = path.split("/")
+            files[f"{package}/__init__.py"] = ""
+            files[f"{package}/{kind}/__init__.py"] = _PACKAGE
+        return files
+
+    def _service(self, found: model.Service, home: str) -> None:
+        self._message(found.request, home)
+        self._message(found.response, home)
+        halves = {"Request": f"{_short(found.name)}_Request", "Response": f"{_short(found.name)}_Response"}
+        self._tails.setdefault(_module(home), []).append(_holder(found.name, halves))
+
+    def _message(self, message: Message, home: str = "", full: bool = True) -> None:
+        path = _module(home or message.name)
+        messages = self._modules.setdefault(path, [])
+        if message not in messages:
+            messages.append(message)
+        if (full or self._was_full(path)) and message.name not in self._full:
+            self._full.add(message.name)
+            self._refuse_wide(message)
+        for nested in self.registry.closure(message).values():
+            other = self._home(nested)
+            if nested not in self._modules.setdefault(_module(other), []):
+                self._message(nested, other, full=False)
+
+    def _home(self, message: Message) -> str:
+        """The definition whose module holds a message: its own, its service's or its action's."""
+        name = message.name
+        while split_type(name).kind != "msg" and "_" in name and not self._is_whole(name):
+            name = name.rpartition("_")[0]
+        return name
+
+    def _is_whole(self, name: str) -> bool:
+        return self.registry.known(name) and not isinstance(self.registry.definition(name), Message)
+
+    def _was_full(self, path: str) -> bool:
+        if self._present is None:
+            return False
+        try:
+            return "def write(" in (self._present / path).read_text("utf-8")
+        except OSError:
+            return False
+
+    def _refuse_wide(self, message: Message) -> None:
+        if _any_wide(leaves(message, self.registry.message)):
+            raise InterfaceError(f"{message.name}: wstring is not supported on boards; use string")
+
+    def _source(self, path: str, messages: list[Message]) -> str:
+        classes = [self._class(message) for message in messages]
+        body = "\n\n".join([*classes, *self._tails.get(path, [])])
+        head = _imports(body)
+        hidden = {name for message in messages for name in _hidden(message)}
+        head += [f"_{name} = {name}" for name in sorted(hidden) if f"_{name}(" in body]
+        return "\n".join([*head, "", "", body] if head else [body])
+
+    def _class(self, message: Message) -> str:
+        found = leaves(message, self.registry.message)
+        memos = Memos()
+        methods: list[str] = []
+        if message.name in self._full:
+            methods += ["    def size(self):", *_indented(size_lines(found, memos))]
+            methods += ["    def write(self, buf, off):", *_indented(write_lines(found, memos))]
+            methods += ["    def read(self, buf, off, n):", *_indented(read_lines(found, self._skeleton))]
+        lines = [f"class {_short(message.name)}:", f'    TYPE = "{message.name}"']
+        lines += [f"    {attribute(c.name)} = {_literal(c.value)}" for c in message.constants]
+        if message.fields:
+            lines += self._init(message, memos)
+        return "\n".join(lines + methods) + "\n"
+
+    def _init(self, message: Message, memos: Memos) -> list[str]:
+        arguments, lines = ["self"], []
+        hidden = _hidden(message)
+        for field in message.fields:
+            name = attribute(field.name)
+            if field.type.nested or _made(field):
+                arguments.append(f"{name}=None")
+                filled = [f"if {name} is None:", *(f"    {line}" for line in self._filled(name, field))]
+                lines += [_unshadowed(line, hidden) for line in filled]
+            else:
+                arguments.append(f"{name}={_literal(_plain(field))}")
+            lines.append(f"self.{name} = {name}")
+        lines += [f'self.{memo} = ["", b""]' for memo in memos.names()]
+        return [f"    def __init__({', '.join(arguments)}):", *_indented(lines)]
+
+    def _filled(self, target: str, field: Field, depth: int = 0) -> list[str]:
+        """Lines that put the default of a field into ``target``."""
+        if not field.type.nested:
+            return [f"{target} = {_made(field) or _literal(_plain(field))}"]
+        nested = self.registry.message(field.type.base)
+        if field.type.kind is Kind.ONE:
+            variable = target if target.isidentifier() else f"v{depth}"
+            lines = [f"{variable} = Fields()"]
+            lines += self._values(variable, nested, depth)
+            return lines if variable == target else [*lines, f"{target} = {variable}"]
+        if field.type.kind is not Kind.ARRAY:
+            return [f"{target} = []"]
+        items, element = f"l{depth}", f"e{depth}"
+        inner = [
+            f"{element} = Fields()",
+            *self._values(element, nested, depth + 1),
+            f"{items}.append({element})",
+        ]
+        loop = [f"for _ in range({field.type.count}):", *(f"    {line}" for line in inner)]
+        return [f"{items} = []", *loop, f"{target} = {items}"]
+
+    def _values(self, variable: str, message: Message, depth: int) -> list[str]:
+        """Lines that set all attributes of a nested message; equal defaults in a row share a line."""
+        lines: list[str] = []
+        shared = ""
+        for field in message.fields:
+            target = f"{variable}.{attribute(field.name)}"
+            if field.type.nested or _made(field):
+                lines += self._filled(target, field, depth + 1)
+                shared = ""
+            elif (value := _literal(_plain(field))) == shared:
+                lines[-1] = f"{target} = {lines[-1]}"
+            else:
+                lines.append(f"{target} = {value}")
+                shared = value
+        return lines
+
+    def _skeleton(self, name: str, variable: str, depth: int = 0) -> list[str]:
+        """Lines that make a nested message with the messages in it, but no values."""
+        lines = [f"{variable} = Fields()"]
+        for field in self.registry.message(name).fields:
+            if field.type.nested and field.type.kind is Kind.ONE:
+                inner = f"f{depth}"
+                lines += self._skeleton(field.type.base, inner, depth + 1)
+                lines.append(f"{variable}.{attribute(field.name)} = {inner}")
+        return lines
+
+
+def _imports(body: str) -> list[str]:
+    lines = []
+    if re.search(r"\b_?array\(", body):
+        lines.append("from array import array")
+    packers = [name for name in ("pack_into", "unpack_from") if f"{name}(" in body]
+    if packers:
+        lines.append(f"from struct import {', '.join(packers)}")
+    helpers = [name for name in _HELPERS if re.search(rf"(?<!\w|\.)_?{name}\(", body)]
+    if helpers:
+        lines.append(f"from muros.cdr import {', '.join(helpers)}")
+    return lines
+
+
+_GLOBALS = frozenset({"Fields", "array", "bytes", "float", "range"})  # what constructors use
+
+
+def _hidden(message: Message) -> set[str]:
+    """The global names that arguments of the constructor hide; they are used with an underscore before them."""
+    return {attribute(field.name) for field in message.fields} & _GLOBALS
+
+
+def _unshadowed(line: str, hidden: set[str]) -> str:
+    for name in hidden:
+        line = re.sub(rf"\b{name}\(", f"_{name}(", line)
+    return line
+
+
+def _plain(field: Field) -> Value | bytes:
+    """The default of a field that is no object of its own."""
+    primitive = PRIMITIVES[field.type.base]
+    if field.type.kind is not Kind.ONE:  # bytes
+        return bytes(field.default if isinstance(field.default, list) else _elements(field))  # type: ignore[arg-type]
+    if field.default is not None:
+        return field.default
+    return "" if not primitive.size else False if field.type.base == "bool" else 0 if primitive.high else 0.0
+
+
+def _made(field: Field) -> str:
+    """The expression that makes the default of a list or array of primitives; "" for other fields."""
+    primitive = PRIMITIVES[field.type.base]
+    if field.type.kind is Kind.ONE or primitive.code == "B":
+        return ""
+    if not primitive.size or primitive.code == "?":
+        zero = "" if not primitive.size else False
+        if field.default is not None:
+            return _literal(field.default)
+        return f"[{zero!r}] * {field.type.count}" if _elements(field) else "[]"
+    if field.default is not None:
+        return f'array("{primitive.code}", {_literal(field.default)})'
+    return f'array("{primitive.code}", {f"bytes({_elements(field) * primitive.size})" if _elements(field) else "[]"})'
+
+
+def _elements(field: Field) -> int:
+    return field.type.count if field.type.kind is Kind.ARRAY else 0
+
+
+def _full_name(registry: Registry, name: str) -> str:
+    if name.count("/") != 1:
+        return "/".join(split_type(name))
+    candidates = ["/".join(split_type(name, kind)) for kind in KINDS]
+    return next((full for full in candidates if registry.known(full)), candidates[0])
+
+
+def _module(name: str) -> str:
+    package, kind, type_name = name.split("/")
+    return f"{package}/{kind}/_{type_name}.py"
+
+
+def _short(name: str) -> str:
+    return name.rpartition("/")[2]
+
+
+def _holder(name: str, members: dict[str, str]) -> str:
+    lines = [f"class {_short(name)}:", f'    TYPE = "{name}"']
+    return "\n".join(lines + [f"    {key} = {value}" for key, value in members.items()]) + "\n"
+
+
+def _indented(lines: list[str]) -> list[str]:
+    return ["        " + line for line in lines]
+
+
+def _any_wide(found: Iterable[Leaf]) -> bool:
+    return any(
+        (isinstance(leaf, Text) and leaf.wide) or (isinstance(leaf, Many) and _any_wide(leaf.body))
+        for leaf in found
+    )
+
+
+def _literal(value: Value | bytes) -> str:
+    if isinstance(value, list):
+        return "[" + ", ".join(_literal(item) for item in value) + "]"
+    text = repr(value)
+    return f'float("{text}")' if text in ("nan", "inf", "-inf") else text
