@@ -28,8 +28,9 @@ EVERYWHERE = frozenset({"array", "errno", "struct"})
 """Standard modules that any module of the board floor may import."""
 
 ELSEWHERE = {
-    "muros/compat.py": frozenset({"micropython", "sys", "time", "uctypes"}),
+    "muros/compat.py": frozenset({"micropython", "os", "sys", "time", "uctypes"}),
     "muros/xrce/_viper.py": frozenset({"micropython"}),
+    "muros/client/discover.py": frozenset({"select", "socket"}),
     "muros/client/udp.py": frozenset({"select", "socket"}),
     "muros/client/tcp.py": frozenset({"select", "socket"}),
     "muros/client/serial.py": frozenset({"os", "select", "termios"}),

@@ -31,8 +31,16 @@ if MPY:
         for i in range(n):
             target[at + i] = source[start + i]
 
+    try:
+        from os import urandom
+    except ImportError:  # a build without a source of entropy: the time since power-on has to do
+
+        def urandom(n):  # type: ignore[no-untyped-def]
+            return bytes([ticks_us() >> (3 * i) & 255 for i in range(n)])
+
 else:
     import time
+    from os import urandom as urandom
 
     def const(value: int) -> int:
         """Marks a module constant; MicroPython folds ``_NAME = const(n)`` away at compile time."""

@@ -61,6 +61,11 @@ class BestEffortOutput:
         self._used = end
         return base + used
 
+    def cancel(self, at: int) -> None:
+        """Takes back the submessage that ``reserve`` gave last, before anything else was called."""
+        used = at - self._base
+        self._used = used if used > len(self._head) else 0
+
     def capacity(self) -> int:
         """Longest payload in bytes that a message of its own can carry."""
         return self.mtu - len(self._head) - _HEAD

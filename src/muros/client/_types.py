@@ -1,0 +1,48 @@
+"""Types of the client's doors; imported by type checkers only."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from muros.xrce._types import Buffer
+
+OnData = Callable[[Buffer, int, int], object]
+"""Takes a sample: ``on_data(buf, off, n)``; the bytes are only lent."""
+Deliver = Callable[[Buffer, int, int], object]
+"""Takes a message from a transport: ``deliver(buf, off, n)``; the bytes are only lent."""
+
+
+class Message(Protocol):
+    """What generated message classes offer."""
+
+    def size(self) -> int:
+        """Bytes of the body."""
+
+    def write(self, buf: bytearray, off: int, /) -> int:
+        """Writes the body at ``off`` and returns its end."""
+
+    def read(self, buf: Buffer, off: int, n: int, /) -> object:
+        """Takes the body ``buf[off:off + n]``; raises ValueError when it is malformed."""
+
+
+class Transport(Protocol):
+    """A way to an agent that carries whole messages."""
+
+    mtu: int
+
+    def open(self) -> bool:
+        """Opens the way, or finds it open; False or OSError when that is not possible yet. Does not block for long."""
+
+    def close(self) -> None:
+        """Closes the way; ``open`` may be called again."""
+
+    def send(self, buf: Buffer, off: int, n: int) -> object:
+        """Sends a message; OSError when the way is gone."""
+
+    def receive(self, deliver: Deliver) -> int:
+        """Calls ``deliver`` for each message that has come, up to a bound, and returns their number.
+
+        Raises OSError when the way is gone.
+        """
+
+    def wait(self, timeout: int) -> object:
+        """Waits until something has come, at most ``timeout`` ms."""

@@ -1,0 +1,162 @@
+"""What cannot go out at once: samples larger than a message, samples that wait, samples to be sent once more.
+
+Items are whole submessages in the order in which they leave. The first of them that does not fit a message is cut
+into fragments as acknowledgements make room; its bytes are kept until the last fragment is acknowledged, so that it
+can be sent again whole. When a session begins anew, ``hold`` takes over every WRITE_DATA that the agent has not
+acknowledged (DDS-XRCE 1.0, 8.4.10 to 8.4.14).
+"""
+
+from muros.client.link import CONNECTED
+from muros.client.session import head
+from muros.compat import const
+from muros.xrce.fragments import Cutter
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from typing import Any
+
+    from muros.client._types import Message
+    from muros.client.session import Session
+    from muros.xrce._types import Buffer
+
+_DELETE = const(3)
+_WRITE_DATA = const(7)
+_FRAGMENT = const(13)
+_LITTLE_ENDIAN = const(0x01)
+_HEAD = const(4)
+
+_OFFLINE = const(0)
+_FULL = const(1)
+_TOO_LARGE = const(2)
+_PROBLEM_TOO_LARGE = const(6)
+_PROBLEM_OFFLINE = const(7)
+_PROBLEM_FULL = const(8)
+
+
+class Backlog:
+    """The backlog of a session."""
+
+    def __init__(self, session: "Session") -> None:
+        self.session = session
+        self.items: "list[bytes | bytearray]" = []
+        self.cutter: "Cutter | None" = None
+        self._cut: "bytes | bytearray | None" = None  # in fragments, the last one not acknowledged
+        self._held: "list[bytes | bytearray]" = []
+
+    def defer(self, writer: "Any", message: "Message", n: int) -> bool:
+        """Sends a sample of ``n`` bytes if it can go out now, else queues it, or counts and reports it."""
+        session = self.session
+        stream = writer.stream
+        ready = session.state == CONNECTED and writer.todo == 0
+        if writer.status or (not ready and not (stream.reliable and session.queue)):
+            return self._refuse(_OFFLINE, _PROBLEM_OFFLINE, writer, n)
+        large = n + _HEAD > stream.capacity()
+        waiting = len(self.items) + (1 if self._cut else 0)
+        if ready and not large and not (stream.reliable and waiting):
+            at = stream.reserve(n + _HEAD)
+            if at >= 0:
+                self._write(stream.buf, at, writer, message, n)
+                stream.flush(session.send, session.now)
+                return True
+        if not stream.reliable:
+            if large:
+                return self._refuse(_TOO_LARGE, _PROBLEM_TOO_LARGE, writer, n)
+            return self._refuse(_FULL, _PROBLEM_FULL, writer, n)
+        if waiting >= (session.queue or (1 if large else 0)):
+            return self._refuse(_FULL, _PROBLEM_FULL, writer, n)
+        data = bytearray(2 * _HEAD + n)
+        self._write(data, 0, writer, message, n)
+        self.items.append(data)
+        self.pump()
+        return True
+
+    def first(self, data: "bytes | bytearray") -> bool:
+        """Puts a large request before everything that waits; False while another one is being cut."""
+        if self.cutter is not None or self._cut is not None:
+            return False
+        self.items.insert(0, data)
+        self.pump()
+        return True
+
+    def pump(self) -> None:
+        """Moves into the stream what it has room for; ends the backlog when nothing is left."""
+        session = self.session
+        stream = session.reliable
+        items = self.items
+        if self._cut is not None and self.cutter is None:
+            if not stream.idle():
+                return
+            self._cut = None
+        while items:
+            data = items[0]
+            if self.cutter is None:
+                if data[0] == _WRITE_DATA and (session.state != CONNECTED or session.pending):
+                    break
+                n = len(data) - _HEAD
+                if n > stream.capacity():
+                    self._cut = data
+                    self.cutter = Cutter(data)
+                else:
+                    at = stream.reserve(n)
+                    if at < 0:
+                        break
+                    stream.buf[at : at + len(data)] = data
+                    items.pop(0)
+                    continue
+            if not self.cutter.pump(stream):
+                break
+            self.cutter = None
+            items.pop(0)
+            break
+        stream.flush(session.send, session.now)
+        if not items and self._cut is None:
+            session.backlog = None
+
+    def hold(self) -> None:
+        """Takes over what the agent has not acknowledged, before the streams begin again."""
+        held: "list[bytes | bytearray]" = []
+        self._held = held
+        self.session.reliable.unacknowledged(self._take)
+        if self.cutter is not None:
+            self.items.pop(0)  # its first fragments are under way
+            self._take_cut()
+        self.items[:0] = held
+        self._held = []
+        self.cutter = self._cut = None
+
+    def _take(self, buf: "Buffer", off: int, n: int) -> None:
+        """Takes the WRITE_DATA and DELETE out of a message that was sent."""
+        pos = len(self.session.head)
+        while pos + _HEAD <= n:
+            at = off + pos
+            size = _HEAD + (buf[at + 2] | buf[at + 3] << 8)
+            kind = buf[at]
+            if kind == _FRAGMENT:
+                self._take_cut()
+            elif kind == _WRITE_DATA or kind == _DELETE:
+                self._held.append(bytes(memoryview(buf)[at : at + size]))
+            pos += size + 3 & ~3
+
+    def _take_cut(self) -> None:
+        """Takes the sample that is being sent in fragments, once and whole; a request is made anew instead."""
+        if self._cut is not None and self._cut[0] == _WRITE_DATA:
+            self._held.append(self._cut)
+        self._cut = None
+
+    def _write(self, buf: bytearray, at: int, writer: "Any", message: "Message", n: int) -> None:
+        request = self.session.requests(1)
+        head(buf, at, _WRITE_DATA, _LITTLE_ENDIAN, n + _HEAD, request, writer.index << 4 | writer.kind)
+        try:
+            message.write(buf, at + 2 * _HEAD)
+        except Exception:
+            if buf is writer.stream.buf:
+                writer.stream.cancel(at)
+            raise
+
+    def _refuse(self, cause: int, code: int, writer: "Any", n: int) -> bool:
+        session = self.session
+        count = session.drops[cause] + 1
+        session.drops[cause] = count
+        if count & count - 1 == 0:  # the 1st, 2nd, 4th, 8th...: never a flood
+            session.problem(code, n, writer.name)
+        return False

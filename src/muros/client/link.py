@@ -1,0 +1,283 @@
+"""A device's connection to an agent: it connects, keeps watch, and comes back by itself after any fault.
+
+Theory of operation. The connection walks through four states, by the table ``_NEXT``:
+
+- WAITING: no agent has answered yet. CREATE_CLIENT goes out every ``retry`` ms.
+- CONNECTING: the agent is there. Streams begin at 0 and what the session holds is created anew.
+- CONNECTED: data flows. After ``keepalive`` ms of silence the agent is asked whether it still knows the session.
+- LOST: it did not answer, or the way is gone. The streams are kept. If the agent still knows the session when it is
+  heard again, everything goes on where it stopped and nothing is lost or doubled; if it does not (it was started
+  anew, or our address changed), the session connects again and sends once more what was never acknowledged.
+
+A CREATE_CLIENT that the network repeats or delays makes the reference agent begin its streams again behind our back.
+Such a session is out of step: the agent acknowledges numbers that were never sent. When that happens ``_FOREIGN``
+times in a row, the session connects again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2, 8.3.5 and 8.4.
+"""
+
+from muros.compat import const, ticks_add, ticks_diff, ticks_ms, urandom
+from muros.xrce.session import SessionCore
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from muros.client._types import Transport
+    from muros.xrce._types import Buffer
+
+WAITING = const(0)
+CONNECTING = const(1)
+CONNECTED = const(2)
+LOST = const(3)
+
+# What happens, in the order of the columns of the table
+_ACCEPTED = const(0)  # the agent made or renewed the session
+_MADE = const(1)  # every entity is created or refused
+_SILENT = const(2)  # pings went unanswered, or the way is gone
+_KNOWN = const(3)  # the agent answered and knows the session
+_UNKNOWN = const(4)  # the agent answered and does not know it, or is out of step with it
+_EVENTS = const(5)
+_NEXT = (
+    b"\1\0\0\0\0"  # from WAITING
+    b"\1\2\0\1\1"  # from CONNECTING
+    b"\2\2\3\2\1"  # from CONNECTED
+    b"\3\3\3\2\1"  # from LOST
+)
+
+_GET_INFO = const(2)
+_STATUS_AGENT = const(4)
+_INFO = const(6)
+_LITTLE_ENDIAN = const(0x01)
+_OBJECT_AGENT = const(0xFFFD)
+_FIRST_REQUEST = const(10)
+_SOON = const(250)  # ms between attempts while an agent is expected back
+_SLOWLY = const(5000)  # ms until a refused session asks again
+_TRIES = const(4)  # unanswered attempts to connect again until we wait
+_FOREIGN = const(8)
+
+_PROBLEM_SESSION = const(1)
+_PROBLEM_OUT_OF_STEP = const(2)
+
+
+class Link(SessionCore):
+    """The connection of a session; ``Session`` adds what is created over it."""
+
+    def __init__(
+        self,
+        transport: "Transport",
+        client_key: "int | bytes | None",
+        session_id: int,
+        mtu: int,
+        largest: int,
+        properties: bool,
+        hard_liveliness: int,
+        retry: int,
+        keepalive: int,
+        ping_timeout: int,
+        ping_attempts: int,
+    ) -> None:
+        if client_key is None:
+            client_key = urandom(3) + b"\1"
+        elif isinstance(client_key, int):
+            client_key = bytes([client_key >> shift & 255 for shift in (24, 16, 8, 0)])
+        if len(client_key) != 4 or client_key == b"\0\0\0\0":
+            raise ValueError("client_key must be 4 bytes or an integer from 1 to 0xFFFFFFFF")
+        super().__init__(session_id, client_key, self._send, self._on, largest)
+        self.transport = transport
+        self.key = client_key
+        self.mtu = mtu
+        self.properties = properties
+        self.hard_liveliness = hard_liveliness
+        self.retry = retry
+        self.keepalive = keepalive
+        self.ping_timeout = ping_timeout
+        self.ping_attempts = ping_attempts
+        self.state = WAITING
+        self.on_state: "Callable[[int], object] | None" = None
+        self.on_problem: "Callable[[int, str], object] | None" = None
+        self.on_time: "Callable[[Buffer, int], object] | None" = None
+        self.request = _FIRST_REQUEST
+        self.login = True  # the agent has yet to accept us
+        self._attempt = b""
+        self.up = False  # the transport is open
+        self._now_due = True  # what is next needs no waiting for _due
+        self._due = 0
+        self._heard = 0
+        self._tries = 0
+        self._ping = 0
+
+    def spin_once(self, now: "int | None" = None) -> int:
+        """Takes what has come and does what is due; returns the number of messages taken. Never waits."""
+        if now is None:
+            now = ticks_ms()
+        self.now = now
+        taken = 0
+        if self.up:
+            try:
+                taken = self.transport.receive(self.deliver)
+            except OSError:
+                self.up = False
+        if not self.up and not self.login and self.state != LOST:
+            self.happened(_SILENT)
+        if self.login:
+            self._connect(now)
+        elif self.state == LOST:
+            self._seek(now)
+        else:
+            self._watch(now)
+            self.work(now)
+            self.flush(now)
+            self.heartbeats(now)
+        return taken
+
+    def requests(self, count: int) -> int:
+        """The first of ``count`` request ids in a row."""
+        first = self.request
+        if first + count > 0xFFFF:
+            first = _FIRST_REQUEST
+        self.request = first + count
+        return first
+
+    def problem(self, code: int, value: int = 0, what: str = "") -> None:
+        """Tells ``on_problem``."""
+        if self.on_problem is not None:
+            from muros.client.problems import text
+
+            self.on_problem(code, text(code, value, what))
+
+    def work(self, now: int) -> None:
+        """What there is to do while CONNECTING or CONNECTED."""
+
+    def accepted(self) -> None:
+        """The agent has made the session: everything begins anew."""
+
+    def happened(self, event: int) -> None:
+        """Takes an event through the table."""
+        new = _NEXT[self.state * _EVENTS + event]
+        self._ping = self._tries = 0
+        self._now_due = True
+        if event == _UNKNOWN or new == WAITING:
+            self.login = True
+        self.enter(new)
+
+    def enter(self, state: int) -> None:
+        """Is in a state, and tells when it is a new one."""
+        if state != self.state:
+            self.state = state
+            if self.on_state is not None:
+                self.on_state(state)
+
+    def on_other(self, kind: int, buf: "Buffer", off: int, n: int) -> None:
+        """Takes the submessages that keep up the connection."""
+        if kind == _INFO:
+            if n >= 6 and self._ping and (buf[off] << 8 | buf[off + 1]) == self._ping:
+                self.happened(_KNOWN if buf[off + 5] else _UNKNOWN)
+        elif kind == _STATUS_AGENT:
+            if n >= 2:
+                self._on_status_agent(buf[off])
+        elif kind == _GET_INFO and n >= 4:
+            at = self.control(_INFO, 8)
+            out = self._control
+            for i in range(8):
+                out[at + i] = buf[off + i] if i < 4 else 0
+            self.send_control()
+
+    if TYPE_CHECKING:
+
+        def submit(self, kind: int, flags: int, request: int, object_id: int, payload: bytes) -> bool:
+            """Puts a submessage with ids into the reliable stream."""
+
+        def _on(self, kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
+            """Takes a submessage."""
+
+    def deliver(self, buf: "Buffer", off: int, n: int) -> None:
+        """Takes a message of the transport."""
+        if self.receive(buf, off, n, self.now):
+            self._heard = self.now
+
+    def _send(self, buf: "Buffer", off: int, n: int) -> None:
+        try:
+            self.transport.send(buf, off, n)
+        except OSError:
+            self.up = False
+
+    def _is_due(self, now: int, again: int) -> bool:
+        """Whether the next attempt is due and the transport open; if so, the one after comes in ``again`` ms."""
+        if not self._now_due and ticks_diff(now, self._due) < 0:
+            return False
+        self._now_due = False
+        self._due = ticks_add(now, again)
+        if not self.up:
+            try:
+                self.up = self.transport.open()
+            except OSError:
+                return False
+        return self.up
+
+    def _connect(self, now: int) -> None:
+        if self._is_due(now, self.retry if self.state == WAITING else _SOON):
+            if self.state == CONNECTING:
+                self._tries += 1
+                if self._tries > _TRIES:
+                    self.happened(_SILENT)
+                    return
+            self._hello()
+
+    def _seek(self, now: int) -> None:
+        if self._is_due(now, _SOON):
+            self._ask()
+
+    def _watch(self, now: int) -> None:
+        if self.foreign >= _FOREIGN:
+            self.foreign = 0
+            self.problem(_PROBLEM_OUT_OF_STEP)
+            self.happened(_UNKNOWN)
+        elif self.keepalive and ticks_diff(now, self._heard) >= self.keepalive:
+            if self._ping == 0:
+                self._now_due = True
+            if self._tries < self.ping_attempts:
+                if self._is_due(now, self.ping_timeout):
+                    self._tries += 1
+                    self._ask()
+            elif ticks_diff(now, self._due) >= 0:
+                self.happened(_SILENT)
+        elif self._ping:
+            self._ping = self._tries = 0
+
+    def _ask(self) -> None:
+        if self._ping == 0:
+            self._ping = self.requests(1)
+        at = self.control(_GET_INFO, 8)
+        out = self._control
+        out[at] = self._ping >> 8
+        out[at + 1] = self._ping & 255
+        out[at + 2] = 0xFF
+        out[at + 3] = 0xFD
+        out[at + 4] = 2
+        out[at + 5] = out[at + 6] = out[at + 7] = 0
+        self.send_control()
+
+    def _hello(self) -> None:
+        from muros.client.hello import hello
+
+        if not self._attempt:
+            self._attempt = urandom(4)
+        message = hello(
+            self.head[0], self.key, self.mtu, self._attempt if self.properties else None, self.hard_liveliness
+        )
+        self._send(message, 0, len(message))
+
+    def _on_status_agent(self, status: int) -> None:
+        if not self.login:
+            # The network repeated our CREATE_CLIENT, so the agent's streams may have begun again. A message on the
+            # reliable stream has the agent acknowledge, and its numbers tell.
+            self.submit(_GET_INFO, _LITTLE_ENDIAN, self.requests(1), _OBJECT_AGENT, b"\2\0\0\0")
+        elif status < 0x80:
+            self.login = False
+            self._attempt = b""
+            self.foreign = 0
+            self._heard = self.now
+            self.accepted()
+            self.happened(_ACCEPTED)
+        else:
+            self.problem(_PROBLEM_SESSION, status)
+            self._due = ticks_add(self.now, _SLOWLY)

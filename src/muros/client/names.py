@@ -1,0 +1,49 @@
+"""Names of ROS as DDS knows them: ``rt/chatter``, ``std_msgs::msg::dds_::String_``, with the limits of the agent."""
+
+from muros.compat import const
+
+_NAME = const(59)
+_TYPE = const(99)
+
+
+def resolve(name: str, namespace: str, node: str) -> str:
+    """The full name of a topic or service: relative names are put in ``namespace``, ``~`` is the node.
+
+    Raises ValueError for an empty name.
+    """
+    if not name:
+        raise ValueError("a topic or service needs a name")
+    if "{" in name:
+        name = name.replace("{node}", node).replace("{namespace}", namespace).replace("{ns}", namespace)
+    if name[0] == "~":
+        name = node + name[1:]
+    elif name[0] == "/":
+        return name
+    return namespace + name if namespace[-1:] == "/" else namespace + "/" + name
+
+
+def topic(prefix: str, name: str, suffix: str = "", limit: int = _NAME) -> str:
+    """The topic in DDS of a full name: ``rt`` for topics, ``rq`` and ``rr`` with a suffix for services.
+
+    Raises ValueError when it is longer than ``limit`` characters: the agent of micro-ROS takes no more.
+    """
+    made = prefix + name + suffix
+    if len(made) > limit:
+        raise ValueError("%s is too long: %d characters as %s, at most %d" % (name, len(made), made, limit))
+    return made
+
+
+def type_name(ros: str, suffix: str = "", limit: int = _TYPE) -> str:
+    """The type in DDS: ``std_msgs/msg/String`` becomes ``std_msgs::msg::dds_::String_``.
+
+    Raises ValueError when it is not a type's name or longer than ``limit`` characters.
+    """
+    parts = ros.split("/")
+    if len(parts) != 3:
+        raise ValueError("%r is no type: it should read like std_msgs/msg/String" % ros)
+    made = parts[0] + "::" + parts[1] + "::dds_::" + parts[2] + suffix + "_"
+    if len(made) > limit:
+        raise ValueError(
+            "type %s is too long: %d characters as %s, at most %d" % (ros, len(made), made, limit)
+        )
+    return made

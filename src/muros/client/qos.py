@@ -1,0 +1,65 @@
+"""Quality of service of writers and readers, and the profiles of ROS by name."""
+
+from muros.compat import const
+
+_RELIABLE = const(0x01)
+_KEEP_LAST = const(0x02)
+_DURABILITIES = ("volatile", "transient_local", "transient", "persistent")
+
+
+class Qos:
+    """What a writer offers or a reader asks for. Times are in ms, 0 means none; depth 0 leaves it to the agent.
+
+    Raises ValueError for a durability that does not exist.
+    """
+
+    def __init__(
+        self,
+        reliable: bool = True,
+        depth: int = 10,
+        durability: str = "volatile",
+        keep_all: bool = False,
+        deadline: int = 0,
+        lifespan: int = 0,
+    ) -> None:
+        if durability not in _DURABILITIES:
+            raise ValueError("durability is one of " + ", ".join(_DURABILITIES))
+        self.flags = (4 << _DURABILITIES.index(durability)) & ~4
+        if reliable:
+            self.flags |= _RELIABLE
+        if not keep_all:
+            self.flags |= _KEEP_LAST
+        self.depth = 0 if keep_all else depth
+        self.deadline = deadline
+        self.lifespan = lifespan
+
+
+def profile(name: "str | Qos") -> Qos:
+    """The QoS of a profile by name: default, sensor_data, best_effort, services, parameters, status, rosout.
+
+    A ``Qos`` is given back as it is. Raises ValueError for an unknown name.
+    """
+    if not isinstance(name, str):
+        return name
+    found = _made.get(name)
+    if found is None:
+        if name == "default" or name == "services":
+            found = Qos()
+        elif name == "sensor_data" or name == "best_effort":
+            found = Qos(False, 5)
+        elif name == "parameters":
+            found = Qos(True, 1000)
+        elif name == "status":
+            found = Qos(True, 1, "transient_local")
+        elif name == "rosout":
+            found = Qos(True, 1000, "transient_local", False, 0, 10000)
+        else:
+            raise ValueError(
+                "no QoS profile " + repr(name) + ": default, sensor_data, best_effort, services, "
+                "parameters, status, rosout or Qos(...)"
+            )
+        _made[name] = found
+    return found
+
+
+_made: "dict[str, Qos]" = {}

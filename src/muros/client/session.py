@@ -1,0 +1,346 @@
+"""A session with an agent and everything created in it: participants, writers, readers, requesters, repliers.
+
+Every entity is created again whenever the connection is made anew (see ``link``). Requests go out a few at a time
+and in the order of adding, each matched with its STATUS by request id and object id and asked for again when none
+comes; creating twice does no harm, as REUSE and REPLACE are set. A refused entity is reported and left alone, the
+others go on. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.3 and 7.8.5.
+"""
+
+from array import array
+
+from muros.client.link import CONNECTED, CONNECTING, LOST, WAITING, Link
+from muros.compat import MPY, const, ticks_add, ticks_diff
+from muros.xrce import create
+from muros.xrce.inputs import BestEffortInput, ReliableInput
+from muros.xrce.outputs import BestEffortOutput, ReliableOutput
+
+__all__ = ["CONNECTED", "CONNECTING", "LOST", "WAITING", "Session"]
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from typing import Any
+
+    from muros.client._types import Message, OnData, Transport
+    from muros.client.backlog import Backlog
+    from muros.client.entities import Entity, Participant, Writer
+    from muros.client.qos import Qos
+    from muros.client.reader import Reader
+    from muros.client.services import Names, OnReply, OnRequest, Replier, Requester
+    from muros.xrce._types import Buffer
+
+_CREATE = const(1)
+_STATUS = const(5)
+_READ_DATA = const(8)
+_DATA = const(9)
+_TIMESTAMP_REPLY = const(15)
+_LITTLE_ENDIAN = const(0x01)
+_CREATE_FLAGS = const(0x07)  # little endian, REUSE and REPLACE
+_STREAM_BEST_EFFORT = const(0x01)
+_STREAM_RELIABLE = const(0x80)
+_OBJECT_CLIENT = const(0xFFFE)
+_ERROR = const(0x80)
+_AT_ONCE = const(8)  # requests in flight: an agent with 16 unacknowledged messages loses a STATUS
+_MADE = const(1)
+
+NO_READER = const(3)
+
+_PROBLEM_ENTITY = const(3)
+_PROBLEM_READ = const(4)
+_PROBLEM_NO_ANSWER = const(5)
+
+
+class Session(Link):
+    """A session with an agent over ``transport``. Nothing but wrong arguments raises; faults change ``state``.
+
+    ``client_key`` is an integer below 2**32 or 4 bytes, never 0; None draws one. With ``session_id`` from 0x80 on,
+    headers carry no key. ``mtu`` (0: the transport's) bounds messages both ways to ``mtu - 4`` bytes. ``history``, a
+    power of two, is how many reliable messages may be in flight, either way. ``creation`` is "binary", "xml" or
+    "reference"; participants by reference have the profile ``reference``. ``properties`` lets CREATE_CLIENT name the
+    attempt, so that a muros agent tells a repetition by the network from a new beginning; other agents ignore it.
+    ``hard_liveliness`` (ms, 0: off) has the agent remove the session after so long a silence. ``queue`` is how many
+    reliable samples wait while the session is down or its window is full; with 0 they are refused. ``largest`` is
+    the longest received sample, in bytes, that is joined from fragments (0: one history on boards, 64 on hosts).
+    ``heartbeat``, ``retry``, ``creation_timeout``, ``keepalive`` (0: off) and ``ping_timeout`` are in ms.
+
+    ``on_state(state)`` is told each new state, ``on_problem(code, text)`` what was refused and why, see ``problems``.
+    ``drops`` counts lost samples: while there was no session, because the window or queue was full, because they were
+    larger than a message, because they were for no reader of ours.
+    """
+
+    def __init__(
+        self,
+        transport: "Transport",
+        client_key: "int | bytes | None" = None,
+        session_id: int = 0x81,
+        mtu: int = 0,
+        history: int = 4,
+        *,
+        creation: str = "binary",
+        properties: bool = True,
+        hard_liveliness: int = 0,
+        queue: int = 0,
+        largest: int = 0,
+        heartbeat: int = 100,
+        retry: int = 1000,
+        creation_timeout: int = 1000,
+        keepalive: int = 1000,
+        ping_timeout: int = 300,
+        ping_attempts: int = 3,
+        reference: str = "participant_profile",
+    ) -> None:
+        mtu = (mtu or transport.mtu) - 4
+        super().__init__(
+            transport,
+            client_key,
+            session_id,
+            mtu,
+            largest or mtu * history * (1 if MPY else 64),
+            properties,
+            hard_liveliness,
+            retry,
+            keepalive,
+            ping_timeout,
+            ping_attempts,
+        )
+        self.best = BestEffortOutput(_STREAM_BEST_EFFORT, mtu, self.head)
+        self.reliable = ReliableOutput(_STREAM_RELIABLE, mtu, self.head, history, heartbeat)
+        self.outputs[_STREAM_BEST_EFFORT] = self.best
+        self.outputs[_STREAM_RELIABLE] = self.reliable
+        self.inputs[_STREAM_BEST_EFFORT] = BestEffortInput(_STREAM_BEST_EFFORT)
+        self.inputs[_STREAM_RELIABLE] = ReliableInput(_STREAM_RELIABLE, mtu, history)
+        self.create: "Any" = create
+        if creation != "binary":
+            from muros.xrce import create_text
+
+            self.create = create_text.Xml() if creation == "xml" else create_text.Reference(reference)
+        self.queue = queue
+        self.creation_timeout = creation_timeout
+        self.drops = array("I", (0, 0, 0, 0))
+        self.entities: "list[Entity]" = []
+        self.objects: "dict[int, Any]" = {}  # what takes DATA, by object id
+        self.backlog: "Backlog | None" = None
+        self.pending = 0  # entities that are not whole yet
+        self._counts = bytearray(9)  # the next index for each kind of object
+        self.waiting = 0  # requests without a STATUS
+        self._late = 0  # the tick when those are made again
+        self._laps = 0  # how often that happened since the last STATUS
+
+    def participant(self, name: str, domain: int = 0) -> "Participant":
+        """A DDS participant, the node of ROS; names are cut at 59 characters."""
+        from muros.client.entities import Participant
+
+        return Participant(self, name[:59], domain)
+
+    def writer(
+        self, participant: "Participant", topic: str, type_name: str, qos: "str | Qos" = "default"
+    ) -> "Writer":
+        """A writer of ``topic``, both names as DDS has them. ``writer.publish(message)`` sends."""
+        from muros.client.entities import Writer
+
+        return Writer(self, participant, topic, type_name, qos)
+
+    def reader(
+        self,
+        participant: "Participant",
+        topic: str,
+        type_name: str,
+        qos: "str | Qos" = "default",
+        on_data: "OnData | None" = None,
+    ) -> "Reader":
+        """A reader of ``topic``; ``on_data(buf, off, n)`` gets each sample, whose bytes are only lent."""
+        from muros.client.reader import Reader
+
+        return Reader(self, participant, topic, type_name, qos, on_data)
+
+    def requester(
+        self,
+        participant: "Participant",
+        names: "Names",
+        on_reply: "OnReply | None" = None,
+        qos: "str | Qos" = "services",
+    ) -> "Requester":
+        """A client of a service; ``on_reply(number, buf, off, n)`` gets replies, see ``services``."""
+        from muros.client.services import Requester
+
+        return Requester(self, participant, names, on_reply, qos)
+
+    def replier(
+        self,
+        participant: "Participant",
+        names: "Names",
+        on_request: "OnRequest | None" = None,
+        qos: "str | Qos" = "services",
+    ) -> "Replier":
+        """A server of a service; ``on_request(identity, buf, off, n)`` gets requests, see ``services``."""
+        from muros.client.services import Replier
+
+        return Replier(self, participant, names, on_request, qos)
+
+    def wait(self, timeout: int) -> None:
+        """Waits until something may have come, at most ``timeout`` ms."""
+        if self.up:
+            self.transport.wait(timeout)
+
+    def close(self) -> None:
+        """Takes leave of the agent, for at most one second, and closes the transport."""
+        from muros.client.closing import close
+
+        close(self)
+
+    # For entities
+
+    def index(self, kind: int) -> int:
+        """A new index for an object of a kind; each is used once."""
+        index = self._counts[kind]
+        self._counts[kind] = index + 1
+        return index
+
+    def add(self, entity: "Entity") -> None:
+        """Has an entity created, now or when the session is connected."""
+        self.entities.append(entity)
+        entity.renew()
+        self.pending += 1
+
+    def submit(
+        self, kind: int, flags: int, request: int, object_id: int, payload: "bytes | bytearray"
+    ) -> bool:
+        """Puts a submessage with ids into the reliable stream; False when there is no room now."""
+        n = 4 + len(payload)
+        stream = self.reliable
+        backlog = self.backlog
+        at = -1 if backlog is not None and backlog.cutter is not None else stream.reserve(n)
+        if at < 0:
+            if n <= stream.capacity():
+                return False
+            data = bytearray(4 + n)
+            head(data, 0, kind, flags, n, request, object_id)
+            data[8:] = payload
+            return self.keep().first(data)
+        head(stream.buf, at, kind, flags, n, request, object_id)
+        stream.buf[at + 8 : at + 4 + n] = payload
+        return True
+
+    def defer(self, writer: "Any", message: "Message", n: int) -> bool:
+        """What becomes of a sample that cannot go out now: it is queued, cut up, or refused and counted."""
+        return self.keep().defer(writer, message, n)
+
+    def keep(self) -> "Backlog":
+        """The backlog, made at the first need."""
+        if self.backlog is None:
+            from muros.client.backlog import Backlog
+
+            self.backlog = Backlog(self)
+        return self.backlog
+
+    # Connecting
+
+    def accepted(self) -> None:
+        """Begins the streams again and has every entity created."""
+        if not self.reliable.idle() or self.backlog is not None:
+            self.keep().hold()
+        self.reset()
+        self.waiting = 0
+        self.pending = len(self.entities)
+        for entity in self.entities:
+            entity.renew()
+
+    def work(self, now: int) -> None:
+        """Creates what is to be created, and sends what waits."""
+        if self.pending:
+            if self.waiting and ticks_diff(now, self._late) >= 0:
+                self.waiting = 0
+                self._laps += 1
+                if self._laps == 3:
+                    self.problem(_PROBLEM_NO_ANSWER)
+                for entity in self.entities:
+                    entity.asked = 0
+            for entity in self.entities:
+                if entity.todo and not self._create(entity, now):
+                    break
+        if self.pending == 0 and self.state == CONNECTING:
+            self.happened(_MADE)
+        if self.backlog is not None:
+            self.backlog.pump()
+
+    def _create(self, entity: "Entity", now: int) -> bool:
+        """Makes the requests of an entity that are not made yet; False when there is no room for them now."""
+        if entity.request == 0:
+            entity.request = self.requests(entity.steps + 1)
+        for step in range(entity.steps):
+            bit = 1 << step
+            if entity.todo & bit and not entity.asked & bit:
+                object_id = entity.object_id(step)
+                if self.waiting >= _AT_ONCE or not self.submit(
+                    _CREATE, _CREATE_FLAGS, entity.request + step, object_id, entity.variant(step)
+                ):
+                    return False
+                entity.asked |= bit
+                self.waiting += 1
+                self._late = ticks_add(now, self.creation_timeout)
+        if entity.todo == 1 << entity.steps:
+            request = entity.request + entity.steps
+            if not self.submit(
+                _READ_DATA, _LITTLE_ENDIAN, request, entity.object_id(entity.steps - 1), entity.reading()
+            ):
+                return False
+            entity.todo = 0
+            self.pending -= 1
+        return True
+
+    def _on(self, kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
+        if kind == _DATA:
+            reader = self.objects.get(buf[off + 2] << 8 | buf[off + 3]) if n >= 4 else None
+            if reader is None:
+                self.drops[NO_READER] += 1
+            else:
+                reader.deliver(buf, off + 4, n - 4)
+        elif kind == _STATUS:
+            if n >= 6:
+                self._on_status(buf[off] << 8 | buf[off + 1], buf[off + 2] << 8 | buf[off + 3], buf[off + 4])
+        elif kind == _TIMESTAMP_REPLY and n >= 24 and self.on_time is not None:
+            self.on_time(buf, off)
+        else:
+            self.on_other(kind, buf, off, n)
+        return 0
+
+    def _on_status(self, request: int, object_id: int, status: int) -> None:
+        if object_id == _OBJECT_CLIENT:
+            self.login = True  # the agent has taken our leave
+            return
+        for entity in self.entities:
+            step = request - entity.request
+            if entity.request == 0 or not 0 <= step <= entity.steps:
+                continue
+            bit = 1 << step
+            if step == entity.steps:
+                if status >= _ERROR:
+                    self.problem(_PROBLEM_READ, status, entity.name)
+            elif entity.asked & bit and entity.object_id(step) == object_id:
+                self.waiting -= 1
+                self._laps = 0
+                entity.asked &= ~bit
+                if entity.todo & bit:
+                    if status < _ERROR:
+                        entity.todo &= ~bit
+                    else:
+                        self.problem(_PROBLEM_ENTITY, status, entity.name)
+                        entity.status = status
+                        entity.todo = 0
+                    if entity.todo == 0:
+                        self.pending -= 1
+            return
+
+
+def head(buf: bytearray, at: int, kind: int, flags: int, n: int, request: int, object_id: int) -> None:
+    """Writes the header of a submessage with ``n`` bytes of payload, and the ids that its payload begins with.
+
+    A payload of 64 KiB or more has length 0: it runs to the end of the message.
+    """
+    buf[at] = kind
+    buf[at + 1] = flags
+    buf[at + 2] = n & 255 if n < 0x10000 else 0
+    buf[at + 3] = n >> 8 if n < 0x10000 else 0
+    buf[at + 4] = request >> 8
+    buf[at + 5] = request & 255
+    buf[at + 6] = object_id >> 8
+    buf[at + 7] = object_id & 255

@@ -1,0 +1,126 @@
+"""CREATE payloads in XML and by reference, in place of the binary ones (DDS-XRCE 1.0, 7.7.3.1 and 7.7.3.2).
+
+The functions have the names and arguments of those in ``create``. The XML is the subset of Fast DDS profiles that
+agents read; a reference names a profile that the agent knows: ``chatter__t`` for a topic, ``chatter__dw`` and
+``chatter__dr`` for its writer and reader.
+"""
+
+from struct import pack
+
+from muros.compat import const
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from muros.xrce.create import EndpointQos
+
+_BY_REFERENCE = const(1)
+_AS_XML = const(2)
+_KIND_PARTICIPANT = const(1)
+_KIND_TOPIC = const(2)
+_KIND_DATAWRITER = const(5)
+_KIND_REQUESTER = const(7)
+_QOS_RELIABLE = const(0x01)
+_QOS_KEEP_LAST = const(0x02)
+_QOS_TRANSIENT_LOCAL = const(0x08)
+
+
+class Xml:
+    """Writes entities as XML."""
+
+    def participant(self, name: str, domain: int) -> bytes:
+        """A participant with a name, in a domain."""
+        text = "<dds><participant><rtps><name>" + name + "</name></rtps></participant></dds>"
+        return _participant(_AS_XML, text, domain)
+
+    def topic(self, name: str, type_name: str, parent: int) -> bytes:
+        """A topic of a participant."""
+        text = "<dds><topic>" + _names(name, type_name) + "</topic></dds>"
+        return _variant(_KIND_TOPIC, _AS_XML, text, parent)
+
+    def group(self, kind: int, parent: int) -> bytes:
+        """A publisher or a subscriber: the defaults."""
+        return _variant(kind, _AS_XML, "", parent)
+
+    def endpoint(
+        self, kind: int, topic_id: int, qos: "EndpointQos", parent: int, name: str, type_name: str
+    ) -> bytes:
+        """A datawriter or a datareader."""
+        tag = "data_writer>" if kind == _KIND_DATAWRITER else "data_reader>"
+        text = (
+            "<dds><"
+            + tag
+            + "<historyMemoryPolicy>PREALLOCATED_WITH_REALLOC</historyMemoryPolicy><qos><reliability>"
+        )
+        text += "<kind>RELIABLE</kind>" if qos.flags & _QOS_RELIABLE else "<kind>BEST_EFFORT</kind>"
+        text += "</reliability>"
+        if qos.flags & _QOS_TRANSIENT_LOCAL:
+            text += "<durability><kind>TRANSIENT_LOCAL</kind></durability>"
+        text += "</qos><topic><kind>NO_KEY</kind>" + _names(name, type_name) + "<historyQos><kind>"
+        text += "KEEP_LAST" if qos.flags & _QOS_KEEP_LAST else "KEEP_ALL"
+        text += "</kind>"
+        if qos.flags & _QOS_KEEP_LAST and qos.depth:
+            text += "<depth>" + str(qos.depth) + "</depth>"
+        return _variant(kind, _AS_XML, text + "</historyQos></topic></" + tag + "</dds>", parent)
+
+    def service(
+        self,
+        kind: int,
+        name: str,
+        request_type: str,
+        reply_type: str,
+        request_topic: str,
+        reply_topic: str,
+        parent: int,
+    ) -> bytes:
+        """A requester or a replier."""
+        tag = "requester" if kind == _KIND_REQUESTER else "replier"
+        text = "<dds><" + tag + ' profile_name="' + str(parent >> 4) + "_" + str(kind)
+        text += '" service_name="' + name + '" request_type="' + request_type + '" reply_type="' + reply_type
+        text += (
+            '"><request_topic_name>' + request_topic + "</request_topic_name><reply_topic_name>" + reply_topic
+        )
+        return _variant(kind, _AS_XML, text + "</reply_topic_name></" + tag + "></dds>", parent)
+
+
+class Reference(Xml):
+    """Writes entities as references to profiles of the agent; services, which have none of their own, as XML."""
+
+    def __init__(self, profile: str) -> None:
+        self.profile = profile
+
+    def participant(self, name: str, domain: int) -> bytes:
+        """A participant by its profile."""
+        return _participant(_BY_REFERENCE, self.profile, domain)
+
+    def topic(self, name: str, type_name: str, parent: int) -> bytes:
+        """A topic by its profile, ``chatter__t``."""
+        return _variant(_KIND_TOPIC, _BY_REFERENCE, _profile(name) + "__t", parent)
+
+    def endpoint(
+        self, kind: int, topic_id: int, qos: "EndpointQos", parent: int, name: str, type_name: str
+    ) -> bytes:
+        """A datawriter or a datareader by its profile, ``chatter__dw`` or ``chatter__dr``."""
+        suffix = "__dw" if kind == _KIND_DATAWRITER else "__dr"
+        return _variant(kind, _BY_REFERENCE, _profile(name) + suffix, parent)
+
+
+def _profile(topic_name: str) -> str:
+    return topic_name[3:] if topic_name.startswith("rt/") else topic_name
+
+
+def _names(name: str, type_name: str) -> str:
+    return "<name>" + name + "</name><dataType>" + type_name + "</dataType>"
+
+
+def _participant(form: int, text: str, domain: int) -> bytes:
+    variant = _text(_KIND_PARTICIPANT, form, text)
+    return variant + bytes(len(variant) & 1) + pack("<h", domain)
+
+
+def _variant(kind: int, form: int, text: str, parent: int) -> bytes:
+    return _text(kind, form, text) + pack(">H", parent)
+
+
+def _text(kind: int, form: int, text: str) -> bytes:
+    data = text.encode()
+    return pack("<BBxxI", kind, form, len(data) + 1) + data + b"\0"
