@@ -8,7 +8,7 @@ from typing import Any, ClassVar, cast
 from muros.interfaces import _hashes, _host
 from muros.interfaces import _model as model
 from muros.interfaces._model import InterfaceError
-from muros.interfaces._names import KINDS, split_type
+from muros.interfaces._names import split_type
 from muros.interfaces._registry import ENV_PATHS, Registry
 from muros.interfaces._runtime import Message
 
@@ -126,15 +126,22 @@ def action(name: str, distro: str | None = None) -> type[ActionType]:
 def load(name: str, distro: str | None = None) -> type[Any]:
     """The class of whatever has that name; the short ``package/Type`` means the first kind that has one."""
     home = registry(distro)
-    full = name
-    if name.count("/") == 1:
-        full = next((n for n in ("/".join(split_type(name, kind)) for kind in KINDS) if home.known(n)), name)
-    described = home.definition("/".join(split_type(full)))
+    described = home.definition(home.full_name(name))
     if isinstance(described, model.Service):
         return service(described.name, distro)
     if isinstance(described, model.Action):
         return action(described.name, distro)
     return message(described.name, distro)
+
+
+def full_name(name: str, distro: str | None = None) -> str:
+    """The full name that is meant by ``package/Type``, or the name itself; :class:`InterfaceError` if it is none."""
+    return registry(distro).full_name(name)
+
+
+def definition_text(name: str, distro: str | None = None) -> str:
+    """The text of a definition alone."""
+    return _hashes.definition_text(definition(name, distro))
 
 
 def definition(name: str, distro: str | None = None) -> model.Definition:

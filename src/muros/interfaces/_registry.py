@@ -86,6 +86,13 @@ class Registry:
         except InterfaceError:
             return True
 
+    def full_name(self, name: str) -> str:
+        """The full name that is meant: ``package/Type`` is the first of msg, srv and action that there is."""
+        if name.count("/") != 1:
+            return "/".join(split_type(name))
+        candidates = ["/".join(split_type(name, kind)) for kind in KINDS]
+        return next((full for full in candidates if self.known(full)), candidates[0])
+
     def definition(self, name: str) -> Definition:
         """The definition of that full name with everything it refers to checked; :class:`InterfaceError` if bad."""
         if name not in self._checked:

@@ -27,7 +27,7 @@ from muros.interfaces._model import (
     Value,
     attribute,
 )
-from muros.interfaces._names import KINDS, split_type
+from muros.interfaces._names import split_type
 from muros.interfaces._registry import Registry
 
 _HELPERS = ("Fields", "block", "count", "encoded", "ended", "integer", "need", "pad", "put_text", "text")
@@ -73,7 +73,7 @@ def sources(
     """The modules that :func:`generate` writes: path -> text. ``present``: a folder whose full types stay full."""
     work = _Work(registry or default_registry(), present)
     for name in names:
-        work.add(_full_name(work.registry, name), action_services)
+        work.add(work.registry.full_name(name), action_services)
     return work.files()
 
 
@@ -296,13 +296,6 @@ def _made(field: Field) -> str:
 
 def _elements(field: Field) -> int:
     return field.type.count if field.type.kind is Kind.ARRAY else 0
-
-
-def _full_name(registry: Registry, name: str) -> str:
-    if name.count("/") != 1:
-        return "/".join(split_type(name))
-    candidates = ["/".join(split_type(name, kind)) for kind in KINDS]
-    return next((full for full in candidates if registry.known(full)), candidates[0])
 
 
 def _module(name: str) -> str:
