@@ -56,12 +56,22 @@ class Bench:
     """An agent core on one wire, with a clock that only moves when told."""
 
     def __init__(
-        self, references: References | None = None, *, locator: Locator | None = None, **limits: Any
+        self,
+        references: References | None = None,
+        *,
+        locator: Locator | None = None,
+        resource_limit: int = 5000,
+        **limits: Any,
     ) -> None:
         self.now = 0
         self.events: list[Event] = []
         self.findings = Findings()
-        self.space = open_space("local:", findings=self.findings, clock=lambda: WALL + self.now * 1_000_000)
+        self.space = open_space(
+            "local:",
+            findings=self.findings,
+            clock=lambda: WALL + self.now * 1_000_000,
+            resource_limit=resource_limit,
+        )
         self.core = AgentCore(
             self.space,
             references or NamedReferences(),
@@ -170,7 +180,7 @@ def _locator(recorded: dict[str, Any]) -> Locator | None:
 
 
 def _learn_guid(message: bytes, bench: Bench, guids: dict[bytes, bytes]) -> None:
-    """Where the recorded agent handed a request to a replier, ours has done so at the same number: same place, our GUID."""
+    """Where the recorded agent handed a request to a replier, ours did at the same number: same place, our GUID."""
     head = 4 if message[0] >= 0x80 else 8
     if len(message) < head + 32 or message[head] != DATA or message[head + 7] & 0x0F != 8:
         return
