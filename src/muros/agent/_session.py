@@ -4,7 +4,6 @@ The streams and their acknowledgements are `SessionCore`'s; links, addresses and
 be done is answered with the status of the specification and reported as a finding; a client can only harm itself.
 """
 
-from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -80,14 +79,7 @@ class AgentSession(SessionCore):
         self.objects: dict[int, Proxy] = {}
         self.created_at = 0
         self.stop_at_failure = core.limits.stop_at_failure
-        self._waiting: deque[Reading] = deque()
-        self._handlers: dict[int, Callable[[int, Buffer, int, int, int], int]] = {
-            WRITE_DATA: self._write_data,
-            CREATE: self._create,
-            READ_DATA: self._read_data,
-            DELETE: self._delete,
-            RESET: self._reset,
-        }
+        self._waiting: list[Reading] = []
 
     # What the agent core calls
 
@@ -129,7 +121,6 @@ class AgentSession(SessionCore):
         """Takes everything of the client out of the space. A message that is being handled has no further effect."""
         self.closed = True
         self.here()
-        self._handlers = {}
         self.reset()
         objects, self.objects = self.objects, {}
         for proxy in reversed(list(objects.values())):
@@ -171,7 +162,7 @@ class AgentSession(SessionCore):
     def wait_for_room(self, reading: Reading) -> None:
         """Calls ``reading.pump()`` when its stream has room again."""
         if len(self._waiting) > len(self.objects):  # those that were replaced wait for nothing
-            self._waiting = deque(other for other in self._waiting if other.active)
+            self._waiting = [other for other in self._waiting if other.active]
         if reading not in self._waiting:
             self._waiting.append(reading)
 
@@ -238,9 +229,10 @@ class AgentSession(SessionCore):
 
     def _on_acknack(self, buf: Buffer, at: int, flags: int) -> None:
         super()._on_acknack(buf, at, flags)
-        waiting, self._waiting = self._waiting, deque()
-        for reading in waiting:
-            reading.pump()
+        if self._waiting:
+            waiting, self._waiting = self._waiting, []
+            for reading in waiting:
+                reading.pump()
 
     def _send(self, message: bytes) -> None:
         self.port.link.send(message, self.address)
@@ -256,9 +248,9 @@ class AgentSession(SessionCore):
     # Submessages
 
     def _submessage(self, kind: int, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
-        handler = self._handlers.get(kind)
-        if handler is not None:
-            return handler(flags, buf, off, n, stream_id)
+        handler = _HANDLERS.get(kind)
+        if handler is not None and not self.closed:
+            return handler(self, flags, buf, off, n, stream_id)
         return self.core.other_submessage(self, kind, flags, buf, off, n, stream_id)
 
     def _write_data(self, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
@@ -478,3 +470,12 @@ class AgentSession(SessionCore):
             remedy="Check the line for noise and the client for its version.",
         )
         return FAILED
+
+
+_HANDLERS: dict[int, Callable[[AgentSession, int, Buffer, int, int, int], int]] = {
+    WRITE_DATA: AgentSession._write_data,
+    CREATE: AgentSession._create,
+    READ_DATA: AgentSession._read_data,
+    DELETE: AgentSession._delete,
+    RESET: AgentSession._reset,
+}
