@@ -11,7 +11,7 @@ import sys
 MPY = sys.implementation.name == "micropython"
 
 if MPY:
-    from time import ticks_add, ticks_diff, ticks_ms, ticks_us  # type: ignore[attr-defined]
+    from time import sleep_ms, ticks_add, ticks_diff, ticks_ms, ticks_us  # type: ignore[attr-defined]
 
     from micropython import const  # type: ignore[import-not-found]
     from uctypes import addressof, bytearray_at  # type: ignore[import-not-found]
@@ -53,6 +53,10 @@ else:
     def ticks_us() -> int:
         """Monotonic microseconds; boards wrap them, hosts do not."""
         return time.monotonic_ns() // 1_000
+
+    def sleep_ms(ms: int) -> None:
+        """Sleeps so many milliseconds."""
+        time.sleep(ms / 1000)
 
     def ticks_add(ticks: int, delta: int) -> int:
         """The tick ``delta`` milliseconds after ``ticks``."""

@@ -1,6 +1,6 @@
 """A way of your own to an agent: four functions, with or without the framing of serial lines."""
 
-from muros.compat import const
+from muros.compat import const, sleep_ms
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -71,9 +71,11 @@ class Custom:
         return self._taken
 
     def wait(self, timeout: int) -> None:
-        """Waits as the ``wait`` that was given does, or not at all."""
+        """Waits as the ``wait`` that was given does, or for a millisecond."""
         if self._wait is not None:
             self._wait(timeout)
+        else:
+            sleep_ms(1)
 
     def _on_frame(self, buf: bytearray, off: int, n: int, source: int) -> None:
         self._taken += 1

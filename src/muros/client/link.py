@@ -129,6 +129,12 @@ class Link(SessionCore):
             self.heartbeats(now)
         return taken
 
+    def next(self, now: int) -> int:
+        """Milliseconds from ``now`` until the connection has something to do."""
+        if self.login or self.state == LOST or self._ping:
+            return 0 if self._now_due else ticks_diff(self._due, now)
+        return self.keepalive - ticks_diff(now, self._heard) if self.keepalive else _SLOWLY
+
     def requests(self, count: int) -> int:
         """The first of ``count`` request ids in a row."""
         first = self.request

@@ -22,7 +22,7 @@ def resolve(name: str, namespace: str, node: str) -> str:
     return namespace + name if namespace[-1:] == "/" else namespace + "/" + name
 
 
-def topic(prefix: str, name: str, suffix: str = "", limit: int = _NAME) -> str:
+def topic_name(prefix: str, name: str, suffix: str = "", limit: int = _NAME) -> str:
     """The topic in DDS of a full name: ``rt`` for topics, ``rq`` and ``rr`` with a suffix for services.
 
     Raises ValueError when it is longer than ``limit`` characters: the agent of micro-ROS takes no more.

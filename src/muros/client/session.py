@@ -9,7 +9,7 @@ others go on. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.3 and 7.8.5.
 from array import array
 
 from muros.client.link import CONNECTED, CONNECTING, LOST, WAITING, Link
-from muros.compat import MPY, const, ticks_add, ticks_diff
+from muros.compat import MPY, const, sleep_ms, ticks_add, ticks_diff
 from muros.xrce import create
 from muros.xrce.inputs import BestEffortInput, ReliableInput
 from muros.xrce.outputs import BestEffortOutput, ReliableOutput
@@ -180,6 +180,17 @@ class Session(Link):
         """Waits until something may have come, at most ``timeout`` ms."""
         if self.up:
             self.transport.wait(timeout)
+        else:
+            sleep_ms(timeout)
+
+    def deadline(self, now: int) -> int:
+        """Milliseconds from ``now`` until ``spin_once`` has something to do of its own accord."""
+        left = self.next(now)
+        if self.pending:
+            left = min(left, ticks_diff(self._late, now)) if self.waiting else 0
+        if not self.reliable.idle():
+            left = min(left, ticks_diff(self.reliable.due, now))
+        return max(left, 1)
 
     def close(self) -> None:
         """Takes leave of the agent, for at most one second, and closes the transport."""

@@ -1,8 +1,8 @@
 """A UART of a board to an agent, framed as on any serial line (see ``muros.xrce.serial``)."""
 
-from machine import UART, idle
+from machine import UART
 
-from muros.compat import const, ticks_diff, ticks_ms
+from muros.compat import const, sleep_ms, ticks_diff, ticks_ms
 from muros.xrce.serial import SerialDeframer, SerialFramer
 
 TYPE_CHECKING = const(0)
@@ -74,7 +74,7 @@ class Uart:
         """Waits until bytes are there, at most ``timeout`` ms."""
         start = ticks_ms()
         while not self._uart.any() and ticks_diff(ticks_ms(), start) < timeout:
-            idle()
+            sleep_ms(1)
 
     def _on_frame(self, buf: bytearray, off: int, n: int, source: int) -> None:
         self._taken += 1

@@ -1,0 +1,47 @@
+"""What users program: context, nodes, publishers, subscriptions, services, timers and executors.
+
+    context = Context(Udp("192.168.1.10", 8888))
+    node = context.node("thermometer", namespace="greenhouse")
+    publisher = node.publisher(Int32, "temperature")
+    node.timer(1.0, lambda: publisher.publish(Int32(data=read_sensor())))
+    Executor(context).spin()
+
+The same source runs on MicroPython and on CPython. Names are imported when they are first used, so that a board loads
+only what its program needs.
+"""
+
+from muros.compat import const
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from muros.client.qos import Qos as Qos
+    from muros.rclc.context import Context as Context
+    from muros.rclc.errors import CapacityError as CapacityError
+    from muros.rclc.errors import InvalidNameError as InvalidNameError
+    from muros.rclc.errors import RclError as RclError
+    from muros.rclc.executor import Executor as Executor
+    from muros.rclc.guard import GuardCondition as GuardCondition
+    from muros.rclc.middleware import register as register
+    from muros.rclc.node import Node as Node
+    from muros.rclc.service import Client as Client
+    from muros.rclc.service import Service as Service
+    from muros.rclc.subscription import Subscription as Subscription
+    from muros.rclc.timer import Timer as Timer
+
+_MODULES = (
+    "Context context CapacityError errors InvalidNameError errors RclError errors Executor executor "
+    "GuardCondition guard register middleware Node node Client service Service service Subscription subscription "
+    "Timer timer"
+)
+
+
+def __getattr__(name: str) -> object:
+    if name == "Qos":
+        from muros.client.qos import Qos
+
+        return Qos
+    words = _MODULES.split()
+    for i in range(0, len(words), 2):
+        if words[i] == name:
+            return getattr(__import__("muros.rclc." + words[i + 1], None, None, (name,)), name)
+    raise AttributeError(name)

@@ -1,0 +1,105 @@
+"""Types of the doors of rclc; imported by type checkers only."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from muros.client._types import Message
+from muros.client.qos import Qos
+from muros.client.services import Names, OnReply, OnRequest
+from muros.xrce._types import Buffer
+
+
+class Entity(Protocol):
+    """What a middleware has made."""
+
+    def destroy(self) -> None:
+        """Takes it away again."""
+
+
+class Publisher(Entity, Protocol):
+    """Writes messages."""
+
+    def publish(self, message: Message, /) -> bool:
+        """Sends a message; False when it was not taken."""
+
+
+class Requester(Entity, Protocol):
+    """Sends requests."""
+
+    def send(self, request: Message, /) -> int:
+        """Sends a request; its number, 0 when it was not taken."""
+
+
+class Replier(Entity, Protocol):
+    """Answers requests."""
+
+    def reply(self, identity: bytes, reply: Message, /) -> bool:
+        """Answers the request of that identity; False when it was not taken."""
+
+
+class Middleware(Protocol):
+    """What carries rclc: a session with an agent, or a data space. Names are those of DDS."""
+
+    state: int
+    on_state: Callable[[int], object] | None
+
+    def participant(self, name: str, domain: int = 0, /) -> Any:
+        """A node."""
+
+    def writer(
+        self, participant: Any, topic: str, type_name: str, qos: str | Qos = "default", /
+    ) -> Publisher:
+        """A writer."""
+
+    def reader(
+        self,
+        participant: Any,
+        topic: str,
+        type_name: str,
+        qos: str | Qos = "default",
+        on_data: Callable[[Buffer, int, int], object] | None = None,
+        /,
+    ) -> Entity:
+        """A reader."""
+
+    def requester(
+        self, participant: Any, names: Names, on_reply: OnReply | None = None, qos: str | Qos = "services", /
+    ) -> Requester:
+        """A client of a service."""
+
+    def replier(
+        self,
+        participant: Any,
+        names: Names,
+        on_request: OnRequest | None = None,
+        qos: str | Qos = "services",
+        /,
+    ) -> Replier:
+        """A server of a service."""
+
+    def spin_once(self, now: int | None = None, /) -> int:
+        """Does what is due and takes what has come."""
+
+    def wait(self, timeout: int, /) -> None:
+        """Waits until something may have come, at most ``timeout`` ms."""
+
+    def deadline(self, now: int, /) -> int:
+        """Milliseconds until ``spin_once`` is wanted."""
+
+    def close(self) -> None:
+        """Ends."""
+
+
+class Handle(Protocol):
+    """What an executor runs."""
+
+    eager: bool
+
+    def ready(self, now: int, /) -> bool:
+        """Whether there is something to run."""
+
+    def run(self, now: int, /) -> object:
+        """Takes one piece of work and runs its callback."""
+
+    def left(self, now: int, /) -> int:
+        """Milliseconds until it is ready of its own accord; a large number when it never is."""

@@ -1,0 +1,56 @@
+"""The context: one way into the ROS graph, and the nodes on it."""
+
+from muros.compat import const
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from muros.rclc._types import Handle, Middleware
+    from muros.rclc.node import Node
+
+STATES = ("WAITING", "CONNECTING", "CONNECTED", "LOST")
+
+
+class Context:
+    """A way into the ROS graph: a transport to an agent, a session of your own making, or a URL.
+
+    ``Context(Udp("192.168.1.10"))``, ``Context(Session(Udp("192.168.1.10"), queue=8))``, ``Context("local:")``.
+    ``client_key`` is for a session that is made here; a random one if it is None. Raises ValueError for a URL that
+    no middleware is registered for.
+    """
+
+    def __init__(self, way: "Any", client_key: "int | bytes | None" = None, domain_id: int = 0) -> None:
+        if isinstance(way, str):
+            from muros.rclc.middleware import open_url
+
+            way = open_url(way, domain_id)
+        elif not hasattr(way, "participant"):
+            from muros.client.session import Session
+
+            way = Session(way, client_key)
+        self.middleware: "Middleware" = way
+        self.domain_id = domain_id
+        self.handles: "list[Handle]" = []  # what no executor has claimed, in the order of making
+        self.running = True
+
+    def node(self, name: str, namespace: str = "") -> "Node":
+        """A node. Raises InvalidNameError."""
+        from muros.rclc.node import Node
+
+        return Node(self, name, namespace)
+
+    @property
+    def state(self) -> str:
+        """WAITING, CONNECTING, CONNECTED or LOST."""
+        return STATES[self.middleware.state]
+
+    def on_state(self, callback: "Callable[[str], object]") -> None:
+        """Calls ``callback(state)`` at each change."""
+        self.middleware.on_state = lambda state: callback(STATES[state])
+
+    def close(self) -> None:
+        """Takes leave of the graph; executors end."""
+        self.running = False
+        self.middleware.close()

@@ -1,0 +1,115 @@
+"""The executor: runs what is ready, in the order of adding.
+
+One pass looks at every handle in turn; what is ready gives one piece of work to its callback. Between passes the
+executor lets the middleware work and waits for whatever comes first: a message, a timer, or a deadline of the
+middleware.
+"""
+
+from muros.compat import const, ticks_add, ticks_diff, ticks_ms
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from muros.rclc.context import Context
+
+_TIMEOUT = const(1000)  # ms that one round of ``spin`` waits at most
+
+
+class Executor:
+    """Runs the handles (subscriptions, timers, services, clients, guard conditions) of a context.
+
+    Without ``add`` it runs everything of the context that no other executor has claimed, in the order of making.
+    ``handles`` bounds how many may be added (0: any number). ``trigger(handles)``, if given, decides before each pass
+    whether anything is taken. ``clock()`` gives ticks in ms.
+    """
+
+    def __init__(
+        self,
+        context: "Context",
+        handles: int = 0,
+        trigger: "Callable[[list[Any]], bool] | None" = None,
+        clock: "Callable[[], int]" = ticks_ms,
+    ) -> None:
+        self.context = context
+        self.capacity = handles
+        self.trigger = trigger
+        self.handles: "list[Any]" = context.handles
+        self._clock = clock
+
+    def add(self, handle: "Any", callback: "Callable[..., object] | None" = None) -> None:
+        """Runs a handle from now on, behind those added before; with ``callback`` in place of its own.
+
+        Raises CapacityError when the executor is full.
+        """
+        if self.handles is self.context.handles:
+            self.handles = []
+        if self.capacity and len(self.handles) >= self.capacity:
+            from muros.rclc.errors import CapacityError
+
+            raise CapacityError(
+                "executor is full: %d handles of %d in use. Create it with handles=%d."
+                % (self.capacity, self.capacity, self.capacity + 1)
+            )
+        if handle in self.context.handles:
+            self.context.handles.remove(handle)
+        if callback is not None:
+            handle.callback = callback
+        handle.eager = self.trigger is None
+        self.handles.append(handle)
+
+    def remove(self, handle: "Any") -> None:
+        """Runs a handle no more; the others keep their order. ValueError when it is not here."""
+        self.handles.remove(handle)
+
+    def spin(self) -> None:
+        """Runs until the context is closed."""
+        while self.context.running:
+            self.round(_TIMEOUT)
+
+    def spin_some(self, timeout: float = 0.0) -> bool:
+        """Waits up to ``timeout`` seconds until something is ready and makes one pass; whether anything ran."""
+        return self.round(int(timeout * 1000))
+
+    spin_once = spin_some
+
+    def spin_period(self, period: float) -> None:
+        """Makes one pass each ``period`` seconds until the context is closed; late ones are caught up."""
+        due = self._clock()
+        while self.context.running:
+            due = ticks_add(due, int(period * 1000))
+            self.work(self._clock())
+            left = ticks_diff(due, self._clock())
+            while left > 0:
+                self.context.middleware.wait(left)
+                self.context.middleware.spin_once(self._clock())
+                left = ticks_diff(due, self._clock())
+
+    def round(self, timeout: int) -> bool:
+        """``spin_some`` with ``timeout`` in ms; allocates nothing."""
+        middleware = self.context.middleware
+        now = self._clock()
+        end = ticks_add(now, timeout)
+        while not self.work(now):
+            left = ticks_diff(end, now)
+            if left <= 0 or not self.context.running:
+                return False
+            left = min(left, middleware.deadline(now))
+            for handle in self.handles:
+                left = min(left, handle.left(now))
+            middleware.wait(left)
+            now = self._clock()
+        return True
+
+    def work(self, now: int) -> bool:
+        """Lets the middleware work and makes one pass at ``now``; whether anything ran."""
+        self.context.middleware.spin_once(now)
+        if self.trigger is not None and not self.trigger(self.handles):
+            return False
+        ran = False
+        for handle in self.handles:
+            if handle.ready(now):
+                handle.run(now)
+                ran = True
+        return ran

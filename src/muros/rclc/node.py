@@ -1,0 +1,129 @@
+"""Nodes, and what is made on them."""
+
+from muros.client.names import resolve, topic_name, type_name
+from muros.compat import const
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from muros.client.qos import Qos
+    from muros.rclc._types import Entity, Publisher
+    from muros.rclc.context import Context
+    from muros.rclc.service import Client, Service
+    from muros.rclc.subscription import Subscription
+    from muros.rclc.timer import Timer
+
+
+class Node:
+    """A node of a context. Topics and services are named relative to ``namespace`` unless they begin with a slash.
+
+    Message types are generated classes, ``Int32`` or ``AddTwoInts``. ``qos`` is a profile's name or a ``Qos``.
+    What is made here raises ValueError for names that are too long.
+    """
+
+    def __init__(self, context: "Context", name: str, namespace: str) -> None:
+        if not namespace.startswith("/"):
+            namespace = "/" + namespace
+        _check(name)
+        if namespace != "/":
+            _check(namespace[1:])
+        self.context = context
+        self.name = name
+        self.namespace = namespace
+        self.entities: "list[Entity]" = []
+        full = name if namespace == "/" else namespace + "/" + name
+        self.participant = context.middleware.participant(full, context.domain_id)
+
+    def publisher(self, kind: "Any", topic: str, qos: "str | Qos" = "default") -> "Publisher":
+        """A publisher: ``publish(message)`` returns whether the message was taken."""
+        made = self.context.middleware.writer(self.participant, self._topic(topic), type_name(kind.TYPE), qos)
+        self.entities.append(made)
+        return made
+
+    def subscription(
+        self,
+        kind: "Any",
+        topic: str,
+        callback: "Callable[[Any], object] | None",
+        qos: "str | Qos" = "default",
+    ) -> "Subscription":
+        """A subscription; an executor calls ``callback(message)``.
+
+        On boards there is one message object, which the next message overwrites: copy what is to be kept.
+        """
+        from muros.rclc.subscription import Subscription
+
+        made = Subscription(self.context, kind, callback, qos)
+        made.entity = self.context.middleware.reader(
+            self.participant, self._topic(topic), type_name(kind.TYPE), qos, made.deliver
+        )
+        self.entities.append(made)
+        return made
+
+    def timer(self, period: float, callback: "Callable[[], object]", autostart: bool = True) -> "Timer":
+        """A timer; an executor calls ``callback()`` every ``period`` seconds, to the millisecond."""
+        from muros.rclc.timer import Timer
+
+        made = Timer(self.context, period, callback, autostart)
+        self.entities.append(made)
+        return made
+
+    def service(
+        self, kind: "Any", name: str, callback: "Callable[[Any], Any]", qos: "str | Qos" = "services"
+    ) -> "Service":
+        """A server of a service; ``callback(request)`` returns the response, or None to answer later."""
+        from muros.rclc.service import Service
+
+        made = Service(self.context, kind, callback)
+        made.entity = self.context.middleware.replier(
+            self.participant, self._service(kind, name), made.deliver, qos
+        )
+        self.entities.append(made)
+        return made
+
+    def client(self, kind: "Any", name: str, qos: "str | Qos" = "services") -> "Client":
+        """A client of a service."""
+        from muros.rclc.service import Client
+
+        made = Client(self.context, kind)
+        made.entity = self.context.middleware.requester(
+            self.participant, self._service(kind, name), made.deliver, qos
+        )
+        self.entities.append(made)
+        return made
+
+    def destroy(self) -> None:
+        """Takes the node and everything made on it away."""
+        for entity in self.entities:
+            entity.destroy()
+        self.entities = []
+        self.participant.destroy()
+
+    def _topic(self, name: str) -> str:
+        return topic_name("rt", resolve(name, self.namespace, self.name))
+
+    def _service(self, kind: "Any", name: str) -> "tuple[str, str, str, str, str]":
+        name = resolve(name, self.namespace, self.name)
+        return (
+            name,
+            type_name(kind.TYPE, "_Request"),
+            type_name(kind.TYPE, "_Response"),
+            topic_name("rq", name, "Request"),
+            topic_name("rr", name, "Reply"),
+        )
+
+
+def _check(name: str) -> None:
+    """Raises InvalidNameError unless ``name`` and each part of it is made as ROS asks."""
+    for part in name.split("/"):
+        good = part != "" and not "0" <= part[0] <= "9"
+        for letter in part:
+            good = good and (letter == "_" or "0" <= letter <= "9" or "a" <= letter.lower() <= "z")
+        if not good:
+            from muros.rclc.errors import InvalidNameError
+
+            raise InvalidNameError(
+                "%r: names are made of letters, digits and _, and begin with no digit" % name
+            )

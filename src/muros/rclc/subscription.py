@@ -1,0 +1,83 @@
+"""Subscriptions: what has come waits here until an executor takes it."""
+
+from muros.client.qos import profile
+from muros.compat import MPY, const
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from muros.client.qos import Qos
+    from muros.rclc._types import Entity
+    from muros.rclc.context import Context
+    from muros.xrce._types import Buffer
+
+_NEVER = const(1000000)
+
+
+class Subscription:
+    """Made by ``Node.subscription``. Up to ``depth`` messages wait: the QoS's depth on hosts, one on boards.
+
+    When one more comes, an executor that only waits for new data has the oldest processed at once, so none is lost;
+    with a trigger or LET the oldest is dropped and counted in ``lost``. ``malformed`` counts samples that are no
+    message of this type.
+    """
+
+    def __init__(
+        self, context: "Context", kind: "Any", callback: "Callable[[Any], object] | None", qos: "str | Qos"
+    ) -> None:
+        self.context = context
+        self.callback = callback
+        self.entity: "Entity | None" = None
+        self.eager = True
+        self.depth = 1 if MPY else profile(qos).depth or 1000
+        self.lost = 0
+        self.malformed = 0
+        self._kind = kind
+        self._waiting: "list[Any]" = []
+        self._message = kind()
+        context.handles.append(self)
+
+    def take(self) -> "Any":
+        """The oldest message that waits, or None."""
+        return self._waiting.pop(0) if self._waiting else None
+
+    def deliver(self, buf: "Buffer", off: int, n: int) -> None:
+        """Takes a sample of the middleware."""
+        waiting = self._waiting
+        if len(waiting) >= self.depth:
+            if self.eager:
+                self.run(0)
+            else:
+                waiting.pop(0)
+                self.lost += 1
+        try:
+            self._message.read(buf, off, n)
+        except ValueError:
+            self.malformed += 1
+            return
+        waiting.append(self._message)
+        if not MPY:
+            self._message = self._kind()
+
+    def ready(self, now: int) -> bool:
+        """Whether a message waits."""
+        return len(self._waiting) > 0
+
+    def run(self, now: int) -> None:
+        """Takes a message and calls the callback."""
+        message = self._waiting.pop(0)
+        if self.callback is not None:
+            self.callback(message)
+
+    def left(self, now: int) -> int:
+        """It never becomes ready of its own accord."""
+        return _NEVER
+
+    def destroy(self) -> None:
+        """Takes it away."""
+        if self in self.context.handles:
+            self.context.handles.remove(self)
+        if self.entity is not None:
+            self.entity.destroy()

@@ -1,0 +1,70 @@
+"""Timers, in whole milliseconds of the steady clock."""
+
+from muros.compat import const, ticks_add, ticks_diff, ticks_ms
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from muros.rclc.context import Context
+
+_NEVER = const(1000000)
+
+
+class Timer:
+    """Made by ``Node.timer``. Calls that come late do not shift the next: the phase is kept, whole periods that were
+    missed are skipped. A period of 0 is always ready. ``since`` is the time from the last call to this one, in ms.
+    """
+
+    def __init__(
+        self, context: "Context", period: float, callback: "Callable[[], object]", autostart: bool
+    ) -> None:
+        self.context = context
+        self.callback = callback
+        self.period = int(period * 1000 + 0.5)
+        self.cancelled = not autostart
+        self.eager = True
+        self.since = 0
+        self._last = ticks_ms()
+        self._next = ticks_add(self._last, self.period)
+        context.handles.append(self)
+
+    def cancel(self) -> None:
+        """Stops it, until ``reset``."""
+        self.cancelled = True
+
+    def reset(self, now: "int | None" = None) -> None:
+        """Starts a new period at the tick ``now``."""
+        self.cancelled = False
+        self._next = ticks_add(ticks_ms() if now is None else now, self.period)
+
+    def exchange_period(self, period: float) -> float:
+        """Sets the period in seconds, used from the next call on; returns the old one."""
+        old = self.period / 1000
+        self.period = int(period * 1000 + 0.5)
+        return old
+
+    def ready(self, now: int) -> bool:
+        """Whether its time has come."""
+        return not self.cancelled and ticks_diff(now, self._next) >= 0
+
+    def run(self, now: int) -> None:
+        """Calls the callback and sets the next time."""
+        period = self.period
+        self.since = ticks_diff(now, self._last)
+        self._last = now
+        late = ticks_diff(now, self._next)
+        self._next = ticks_add(
+            self._next, period if late < period or period == 0 else late // period * period + period
+        )
+        self.callback()
+
+    def left(self, now: int) -> int:
+        """Milliseconds until its time comes."""
+        return _NEVER if self.cancelled else max(ticks_diff(self._next, now), 0)
+
+    def destroy(self) -> None:
+        """Takes it away."""
+        self.cancelled = True
+        if self in self.context.handles:
+            self.context.handles.remove(self)
