@@ -1,6 +1,6 @@
 """The ends: entities are destroyed, sessions take leave of their agent."""
 
-from muros.client.link import LOST, WAITING
+from muros.client.link import WAITING
 from muros.client.session import head
 from muros.compat import const
 
@@ -44,7 +44,7 @@ def close(session: "Session") -> None:
     transport = session.transport
     try:
         for _ in range(_ATTEMPTS):
-            if session.login or session.state == LOST:
+            if session.login or not session.up:
                 break
             at = session.control(_DELETE, 4)
             out = session.control_buffer()

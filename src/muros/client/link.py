@@ -76,7 +76,9 @@ class Link(SessionCore):
         ping_attempts: int,
     ) -> None:
         if client_key is None:
-            client_key = urandom(3) + b"\1"
+            client_key = urandom(4)
+            if client_key == b"\0\0\0\0":
+                client_key = b"\0\0\0\1"
         elif isinstance(client_key, int):
             client_key = bytes([client_key >> shift & 255 for shift in (24, 16, 8, 0)])
         if len(client_key) != 4 or client_key == b"\0\0\0\0":

@@ -21,12 +21,14 @@ _AT_ONCE = const(16)
 _PATIENCE = const(2000)  # ms that the line may take none of our bytes
 _POLLIN = const(1)
 _POLLOUT = const(4)
+_VMIN = const(6)
 
 
 class Serial:
     """The port ``device`` at ``baud``. It need not be there yet, and may come and go.
 
-    ``source`` and ``destination`` are the addresses on the line: a client's is 1, the agent's 0.
+    ``source`` and ``destination`` are the addresses on the line: a client's is 1, the agent's 0. Raises ValueError
+    for a speed that the system does not have.
     """
 
     def __init__(
@@ -34,7 +36,9 @@ class Serial:
     ) -> None:
         self.mtu = mtu
         self.device = device
-        self.baud = baud
+        self._speed: int = getattr(termios, "B%d" % baud, -1)
+        if self._speed < 0:
+            raise ValueError("%d baud: this system has no such speed" % baud)
         self.deframer = SerialDeframer(source, mtu)
         self._framer = SerialFramer(source, destination, self._write)
         self._rx = bytearray(_CHUNK)
@@ -48,8 +52,8 @@ class Serial:
         if self._file is None:
             file = _open(self.device)
             try:
-                _make_raw(file.fileno(), self.baud)
-            except (OSError, ValueError, AttributeError):
+                _make_raw(file.fileno(), self._speed)
+            except OSError:
                 file.close()
                 raise
             self._poll = select.poll()
@@ -135,10 +139,11 @@ if MPY:
     def _open(device):  # type: ignore[no-untyped-def]
         return open(device, "r+b", buffering=0)
 
-    def _make_raw(fd, baud):  # type: ignore[no-untyped-def]
+    def _make_raw(fd, speed):  # type: ignore[no-untyped-def]
         termios.setraw(fd)
         attributes = termios.tcgetattr(fd)
-        attributes[4] = attributes[5] = getattr(termios, "B%d" % baud)
+        attributes[4] = attributes[5] = speed
+        attributes[6][_VMIN] = 0  # what reads a file here asks again until its buffer is full
         termios.tcsetattr(fd, termios.TCSANOW, attributes)
 
     def _write_some(file, buf, start, n):  # type: ignore[no-untyped-def]
@@ -150,17 +155,13 @@ else:
         fd = os.open(device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         return open(fd, "r+b", buffering=0)
 
-    def _make_raw(fd: int, baud: int) -> None:
-        speed = getattr(termios, "B%d" % baud, None)
-        if speed is None:
-            raise ValueError("%d baud is no speed of this system" % baud)
+    def _make_raw(fd: int, speed: int) -> None:
         attributes = termios.tcgetattr(fd)
         attributes[0] = termios.IGNBRK
         attributes[1] = attributes[3] = 0
         attributes[2] = termios.CS8 | termios.CREAD | termios.CLOCAL
         attributes[4] = attributes[5] = speed
         termios.tcsetattr(fd, termios.TCSANOW, attributes)
-        termios.tcflush(fd, termios.TCIOFLUSH)
 
     def _write_some(file: "Any", buf: bytearray, start: int, n: int) -> int:
         return file.write(memoryview(buf)[start:n]) or 0
