@@ -138,12 +138,13 @@ class AgentCore:
         self.now = 0
         self.on_event: Callable[[Event], object] | None = None
         self.on_wake: Callable[[int], object] | None = None
-        self.unacknowledged: set[AgentSession] = set()
+        # dicts are sets that keep their order: the same input gives the same output
+        self.unacknowledged: dict[AgentSession, None] = {}
         self.clients: dict[bytes, AgentSession] = {}
         self._wall = wall
         self._ports: list[Port] = []
-        self._fresh: set[AgentSession] = set()
-        self._watched: set[AgentSession] = set()
+        self._fresh: dict[AgentSession, None] = {}
+        self._watched: dict[AgentSession, None] = {}
         self._calls = Calls()
         self._attempts: dict[tuple[bytes, str], int] = {}
         self._heartbeat_at = 0
@@ -182,7 +183,7 @@ class AgentCore:
         ]
         for session in lost:
             session.lost_at = now
-            self.unacknowledged.discard(session)
+            self.unacknowledged.pop(session, None)
             keep = self.limits.keep_lost
             self.tell(ClientLost(session.number, reason, None if keep is None else keep / 1000))
             if keep is not None:
@@ -235,13 +236,13 @@ class AgentCore:
     def has_unacknowledged(self, session: AgentSession) -> None:
         """The session has sent something that wants an acknowledgement."""
         if session not in self.unacknowledged:
-            self.unacknowledged.add(session)
+            self.unacknowledged[session] = None
             self._wake(self.now + _TICK)
 
     def has_created(self, session: AgentSession) -> None:
         """The session has made an entity."""
         if session not in self._fresh:
-            self._fresh.add(session)
+            self._fresh[session] = None
             self._wake(self.now + _TICK)
 
     def _heartbeats(self, now: int) -> None:
@@ -251,7 +252,7 @@ class AgentCore:
                 continue
             session.heartbeats(now)
             if all(stream_id < 0x80 or stream.idle() for stream_id, stream in session.outputs.items()):
-                self.unacknowledged.discard(session)
+                self.unacknowledged.pop(session, None)
 
     def _probe(self, now: int) -> None:
         if not self._watched or now < self._liveliness_at:
@@ -279,7 +280,7 @@ class AgentCore:
 
     def _ready(self, now: int) -> None:
         for session in [s for s in self._fresh if now - s.created_at >= _QUIET]:
-            self._fresh.discard(session)
+            self._fresh.pop(session, None)
             proxies = session.objects.values()
             nodes = tuple(p.participant.name and p.detail for p in proxies if isinstance(p, ParticipantProxy))
             kinds = [proxy.kind for proxy in proxies]
@@ -302,8 +303,8 @@ class AgentCore:
             del self.clients[session.key]
         if session.port.sessions.get(session.address) is session:
             del session.port.sessions[session.address]
-        self._fresh.discard(session)
-        self._watched.discard(session)
+        self._fresh.pop(session, None)
+        self._watched.pop(session, None)
         if session.attempt:
             self._remember(session)
         session.close()
@@ -477,11 +478,11 @@ class AgentCore:
         session.liveliness = int(text) if text.isascii() and text.isdigit() and len(text) <= 9 else 0
         session.probes = 0
         if session.liveliness:
-            self._watched.add(session)
+            self._watched[session] = None
             self._liveliness_at = min(self._liveliness_at, self.now + session.liveliness)
             self._wake(self.now + min(session.liveliness, _LIVELINESS_TICK))
         else:
-            self._watched.discard(session)
+            self._watched.pop(session, None)
 
     def _move(self, session: AgentSession, port: Port, address: Hashable) -> None:
         if session.port is not port or session.address != address:

@@ -126,7 +126,7 @@ class AgentSession(SessionCore):
         for proxy in reversed(list(objects.values())):
             proxy.close()
         self._waiting.clear()
-        self.core.unacknowledged.discard(self)
+        self.core.unacknowledged.pop(self, None)
 
     def answer_control(self, submessage: bytes) -> None:
         """Sends a submessage on stream 0."""
