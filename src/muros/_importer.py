@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
 from importlib import import_module
 from importlib.machinery import ModuleSpec, PathFinder
-from types import ModuleType
 
-TYPE_CHECKING = False  # typing itself would cost more than all the rest
-if TYPE_CHECKING:
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # typing and collections.abc would be the slowest part of `import muros`
+    from collections.abc import Sequence
+    from types import ModuleType
     from typing import Any
 
 _KINDS = ("msg", "srv", "action")

@@ -99,7 +99,7 @@ def pad(buf: "bytearray", p: int, start: int, align: int) -> int:
 
 def block(values: "Sequence[Any]", code: str, n: int) -> "Any":
     """The ``n`` numbers of an array as what ``struct`` packs with ``s``. Anything but an array or bytes allocates."""
-    if not isinstance(values, (array, bytes)):
+    if not isinstance(values, array) and not isinstance(values, bytes):  # a tuple of both would allocate
         values = array(code, values)
     if len(values) != n:
         raise CdrError("%d elements, %d needed" % (len(values), n))

@@ -10,27 +10,26 @@ from muros.interfaces import _model as model
 from muros.interfaces._model import InterfaceError
 from muros.interfaces._names import split_type
 from muros.interfaces._registry import ENV_PATHS, Registry
-from muros.interfaces._runtime import Message
 
 
 class ServiceType:
     """The base of service types: what they have in common."""
 
     TYPE: ClassVar[str]
-    Request: ClassVar[type[Message]]
-    Response: ClassVar[type[Message]]
+    Request: ClassVar[type[Any]]
+    Response: ClassVar[type[Any]]
 
 
 class ActionType:
     """The base of action types: their own messages, and the services and message that carry them."""
 
     TYPE: ClassVar[str]
-    Goal: ClassVar[type[Message]]
-    Result: ClassVar[type[Message]]
-    Feedback: ClassVar[type[Message]]
+    Goal: ClassVar[type[Any]]
+    Result: ClassVar[type[Any]]
+    Feedback: ClassVar[type[Any]]
     SendGoal: ClassVar[type[ServiceType]]
     GetResult: ClassVar[type[ServiceType]]
-    FeedbackMessage: ClassVar[type[Message]]
+    FeedbackMessage: ClassVar[type[Any]]
 
 
 _registries: dict[str | None, Registry] = {}
@@ -69,11 +68,11 @@ def add_path(folder: str | os.PathLike[str]) -> tuple[str, ...]:
     return found
 
 
-def message(name: str, distro: str | None = None) -> type[Message]:
+def message(name: str, distro: str | None = None) -> type[Any]:
     """The class of a message, ``std_msgs/msg/Int32`` or short ``std_msgs/Int32``; always the same one.
 
-    Also gives the messages of services and actions (``example_interfaces/srv/AddTwoInts_Request``). Raises
-    :class:`InterfaceError`.
+    It is a subclass of :class:`MessageBase` with the message's fields as arguments and attributes. Also gives the
+    messages of services and actions (``example_interfaces/srv/AddTwoInts_Request``). Raises :class:`InterfaceError`.
     """
     home = registry(distro)
     full = "/".join(split_type(name))
@@ -82,7 +81,7 @@ def message(name: str, distro: str | None = None) -> type[Message]:
         described = home.message(full)
         made = _host.build(home, described, lambda nested: message(nested, distro))
         _classes[home, full] = made
-    return cast("type[Message]", made)
+    return made
 
 
 def service(name: str, distro: str | None = None) -> type[ServiceType]:

@@ -261,6 +261,10 @@ class _Writer(_Walker):
 
     def _flush(self) -> None:
         if self._run:
+            if self._run[-1].endswith("x"):  # MicroPython writes padding only before a value
+                zeros = bytes(int(self._run[-1][:-1] or 1))
+                self._run[-1] = f"{len(zeros)}s"
+                self._values.append(repr(zeros))
             values = "".join(f", {value}" for value in self._values)
             self.code.line(f'pack_into("{format_text("<", self._run)}", buf, {self._position()}{values})')
         self._const += self._run_size

@@ -224,7 +224,7 @@ def _default(field: Field) -> tuple[str, str]:
             return "None", f"[{zero!r}] * {kind.count}" if kind.kind is Kind.ARRAY else "[]"
         return "None", _literal(value)
     if value is None:
-        inside = f", bytes({kind.count * primitive.size})" if kind.kind is Kind.ARRAY else ""
+        inside = f", _bytes({kind.count * primitive.size})" if kind.kind is Kind.ARRAY else ""
         return "None", f'_array("{primitive.code}"{inside})'
     return "None", f'_array("{primitive.code}", {_literal(value)})'
 
@@ -233,7 +233,7 @@ def _literal(value: Value) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(_literal(item) for item in value) + "]"
     text = repr(value)
-    return f'float("{text}")' if text in ("nan", "inf", "-inf") else text
+    return f'_float("{text}")' if text in ("nan", "inf", "-inf") else text
 
 
 def _annotation(kind: FieldType) -> str:
@@ -269,6 +269,8 @@ _HELPERS: dict[str, Any] = {
     **{f"_{name}": getattr(_runtime, name) for name in _runtime.NAMES},
     "_Struct": Struct,
     "_array": array,
+    "_bytes": bytes,
+    "_float": float,
     "_range": range,
     "array": array,
 }

@@ -14,7 +14,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from muros.interfaces import _standard
-from muros.interfaces._model import Action, Definition, Field, InterfaceError, Message, Service
+from muros.interfaces._model import Action, Definition, Field, FieldType, InterfaceError, Message, Service
 from muros.interfaces._names import KINDS, split_type
 from muros.interfaces._parse import MAX_TEXT, parse
 
@@ -25,6 +25,7 @@ _DEPTH = 3  # folders below the one given that are searched for packages
 _DERIVED = re.compile(
     r"(\w+?)_(Request|Response|Event|Goal|Result|Feedback|FeedbackMessage|(?:SendGoal|GetResult)\w*)\Z"
 )
+_ROS1_ACTION = re.compile(r"(\w+)/msg/(\w+?)(Action)?(Goal|Result|Feedback)?\Z")
 _PACKAGE_NAME = re.compile(r"<name>\s*([a-z][a-z0-9_]*)\s*</name>")
 
 
@@ -124,6 +125,7 @@ class Registry:
         """The message as ROS 1 defines it: the user's, else that of noetic, else one that comes with muros."""
         found = self._file(self._files, name) or _standard.stored_message(name, "noetic")
         found = found or self._derived(name, self.ros1_definition) or self._file(self._shared(), name)
+        found = found or self._ros1_action_message(name)
         return found if isinstance(found, Message) else None
 
     def ros1_definition(self, name: str) -> Definition | None:
@@ -131,6 +133,23 @@ class Registry:
         if split_type(name).kind == "msg":
             return self.ros1_message(name)
         return self._file(self._files, name) or self._file(self._shared(), name)
+
+    def _ros1_action_message(self, name: str) -> Message | None:
+        """One of the seven messages that ROS 1 makes of an action, such as ``FibonacciActionGoal``."""
+        match = _ROS1_ACTION.match(name)
+        found = match and self.ros1_definition(f"{match[1]}/action/{match[2]}")
+        if not match or not isinstance(found, Action):
+            return None
+        part, whole = match[4], f"{match[1]}/msg/{match[2]}"
+        parts = {"Goal": found.goal, "Result": found.result, "Feedback": found.feedback}
+        if not match[3]:
+            return Message(name, parts[part].fields, parts[part].constants) if part else None
+        if not part:
+            return Message(name, tuple(_member(f"action_{p.lower()}", f"{whole}Action{p}") for p in parts))
+        inner = _member(part.lower(), whole + part)
+        about = _member("goal_id", "actionlib_msgs/msg/GoalID")
+        about = about if part == "Goal" else _member("status", "actionlib_msgs/msg/GoalStatus")
+        return Message(name, (_member("header", "std_msgs/msg/Header"), about, inner))
 
     # ---- finding ----
 
@@ -216,8 +235,10 @@ class Registry:
         text = f"unknown type '{shown.partition('[')[0] or name}'"
         of_kind = [other for other in self.names() if other.split("/")[1] == kind]
         same = [other for other in of_kind if other.startswith(f"{package}/")]
-        near = get_close_matches(name, same, 1, 0.6) or get_close_matches(name, of_kind, 1, 0.8)
+        short = get_close_matches(type_name, [other.rpartition("/")[2] for other in same], 1, 0.7)
+        near = [f"{package}/{kind}/{short[0]}"] if short else []
         near = near or [other for other in of_kind if other.endswith(f"/{type_name}")][:1]
+        near = near or get_close_matches(name, of_kind, 1, 0.85)
         if near:
             return f"{text} (did you mean {near[0].replace('/msg/', '/') if shown else near[0]}?)"
         if not same and package not in self.packages():
@@ -268,6 +289,10 @@ def _shown(path: Path) -> str:
     """The path as the user would write it: relative to the working folder when it lies inside."""
     relative = os.path.relpath(path)
     return os.fspath(path) if relative.startswith("..") else relative
+
+
+def _member(name: str, type_name: str) -> Field:
+    return Field(name, FieldType(type_name, nested=True))
 
 
 def _place(message: Message, field: Field) -> str:

@@ -83,6 +83,10 @@ def stored_message(name: str, distro: str) -> Message | None:
         return None
     constants, fields = entry[0], entry[1]
     defaults = _DEFAULTS.get(name, {}) if distro != "noetic" else {}
+    if name == "sensor_msgs/msg/NavSatStatus" and "STATUS_UNKNOWN" not in {
+        constant[0] for constant in constants
+    }:
+        defaults = {}  # came with Jazzy, together with the constant
     present = {field[0] for field in fields}
     return Message(
         name,

@@ -105,7 +105,7 @@ def _imports(home: Registry, message: Message) -> str:
     lines += [
         "",
         "Octets = bytes | bytearray | memoryview | Sequence[int]",
-        "_array, _range = array, range",
+        "_array, _bytes, _float, _range = array, bytes, float, range",
         "",
         "",
     ]
