@@ -303,29 +303,28 @@ class Bench:
         """A client that misbehaves must cost the others nothing."""
         report = self.report
         report.table(
-            "nobody stalls another: latency of a pair, p50 / p99 in us",
-            "beside",
-            "32 B reliable",
+            "nobody stalls another: latency of a pair, 32 B reliable, p50 / p99 in us",
+            "beside, at the same agent",
+            "muros",
+            "at another agent",
             "ratio of p50",
         )
-        flows: dict[str, list[load.Flow]] = {name: [] for name in _COMPANY}
-        for _ in range(2 * self.sizes.rounds - 1):
-            for name, prepare in _COMPANY.items():
-                with self._pair(self.agent, RELIABLE) as (server, writer, reader), ExitStack() as stack:
-                    prepare(self, server, stack)
-                    table = self._messages(RELIABLE, 32)
-                    flows[name].append(load.latency(writer, reader, table, self.sizes.pings, 0.001))
-        best = {name: min(found, key=lambda flow: flow.percentile(99)) for name, found in flows.items()}
-        alone = best["nobody"].percentile(50)
-        for name, flow in best.items():
+        for name, prepare in _COMPANY.items():
+            here, there = (
+                [self._in_company(prepare, apart=apart) for _ in range(self.sizes.rounds)]
+                for apart in (False, True)
+            )
+            ours, control = (min(flows, key=lambda flow: flow.percentile(99)) for flows in (here, there))
             report.row(
                 "stall",
                 None,
-                [name, _p(flow), _ratio(flow.percentile(50), alone)],
+                [name, _p(ours), _p(control), _ratio(ours.percentile(50), control.percentile(50))],
                 beside=name,
-                p50=flow.percentile(50),
-                p99=flow.percentile(99),
-                lost=sum(each.lost for each in flows[name]),
+                p50=ours.percentile(50),
+                p99=ours.percentile(99),
+                control_p50=control.percentile(50),
+                control_p99=control.percentile(99),
+                lost=sum(flow.lost for flow in here),
             )
 
     # Set-ups
@@ -367,6 +366,12 @@ class Bench:
             with pair() as (_, writer, reader):
                 flows.append(load.latency(writer, reader, table, self.sizes.pings, pause))
         return min(flows, key=lambda flow: flow.percentile(99))
+
+    def _in_company(self, prepare: Callable[["Bench", Server, ExitStack], None], *, apart: bool) -> load.Flow:
+        """The latency of a pair; with ``apart`` the company is at another agent: it costs the machine as much."""
+        with self._pair(self.agent, RELIABLE) as (server, writer, reader), ExitStack() as stack:
+            prepare(self, stack.enter_context(Server(self.agent)) if apart else server, stack)
+            return load.latency(writer, reader, self._messages(RELIABLE, 32), self.sizes.pings, 0.001)
 
     def _best(self, command: str, count: int, history: int, reading: bool) -> load.Flow:
         flows = []
