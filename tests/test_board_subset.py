@@ -30,7 +30,7 @@ EVERYWHERE = frozenset({"array", "errno", "struct"})
 ELSEWHERE = {
     "muros/compat.py": frozenset({"micropython", "os", "sys", "time", "uctypes"}),
     "muros/xrce/_viper.py": frozenset({"micropython"}),
-    "muros/client/discover.py": frozenset({"select", "socket"}),
+    "muros/client/discovery.py": frozenset({"select", "socket"}),
     "muros/client/udp.py": frozenset({"select", "socket"}),
     "muros/client/tcp.py": frozenset({"select", "socket"}),
     "muros/client/serial.py": frozenset({"os", "select", "termios"}),

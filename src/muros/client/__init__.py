@@ -8,12 +8,12 @@ from muros.compat import const
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.client.custom import Custom as Custom
-    from muros.client.discover import discover as discover
+    from muros.client.discovery import discover as discover
     from muros.client.link import CONNECTED as CONNECTED
     from muros.client.link import CONNECTING as CONNECTING
     from muros.client.link import LOST as LOST
     from muros.client.link import WAITING as WAITING
-    from muros.client.ping import ping as ping
+    from muros.client.presence import ping as ping
     from muros.client.qos import Qos as Qos
     from muros.client.serial import Serial as Serial
     from muros.client.session import Session as Session
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from muros.client.udp import Udp as Udp
 
 _MODULES = (
-    "Custom custom discover discover CONNECTED link CONNECTING link LOST link WAITING link ping ping Qos qos "
+    "Custom custom discover discovery CONNECTED link CONNECTING link LOST link WAITING link ping presence Qos qos "
     "Serial serial Session session Tcp tcp TimeSync timesync Uart uart Udp udp"
 )
 

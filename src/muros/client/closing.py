@@ -1,6 +1,6 @@
 """The ends: entities are destroyed, sessions take leave of their agent."""
 
-from muros.client.link import WAITING
+from muros.client.link import LOST, WAITING
 from muros.client.session import head
 from muros.compat import const
 
@@ -39,20 +39,25 @@ def destroy(entity: "Entity") -> None:
         backlog.items.append(data)
 
 
+def leave(session: "Session") -> None:
+    """Asks the agent once to delete the session."""
+    at = session.control(_DELETE, 4)
+    out = session.control_buffer()
+    out[at] = 0
+    out[at + 1] = _REQUEST_LOGOUT
+    out[at + 2] = _OBJECT_CLIENT >> 8
+    out[at + 3] = _OBJECT_CLIENT & 255
+    session.send_control()
+
+
 def close(session: "Session") -> None:
     """Deletes the session at the agent, in at most ten attempts of 100 ms, and closes the transport for good."""
     transport = session.transport
     try:
         for _ in range(_ATTEMPTS):
-            if session.login or not session.up:
+            if session.login or session.state == LOST:
                 break
-            at = session.control(_DELETE, 4)
-            out = session.control_buffer()
-            out[at] = 0
-            out[at + 1] = _REQUEST_LOGOUT
-            out[at + 2] = _OBJECT_CLIENT >> 8
-            out[at + 3] = _OBJECT_CLIENT & 255
-            session.send_control()
+            leave(session)
             transport.wait(_PATIENCE)
             transport.receive(session.deliver)
     except OSError:

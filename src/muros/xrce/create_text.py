@@ -30,16 +30,16 @@ class Xml:
     def participant(self, name: str, domain: int) -> bytes:
         """A participant with a name, in a domain."""
         text = "<dds><participant><rtps><name>" + name + "</name></rtps></participant></dds>"
-        return _participant(_AS_XML, text, domain)
+        return participant_by_text(_AS_XML, text, domain)
 
     def topic(self, name: str, type_name: str, parent: int) -> bytes:
         """A topic of a participant."""
         text = "<dds><topic>" + _names(name, type_name) + "</topic></dds>"
-        return _variant(_KIND_TOPIC, _AS_XML, text, parent)
+        return by_text(_KIND_TOPIC, _AS_XML, text, parent)
 
     def group(self, kind: int, parent: int) -> bytes:
         """A publisher or a subscriber: the defaults."""
-        return _variant(kind, _AS_XML, "", parent)
+        return by_text(kind, _AS_XML, "", parent)
 
     def endpoint(
         self, kind: int, topic_id: int, qos: "EndpointQos", parent: int, name: str, type_name: str
@@ -60,7 +60,7 @@ class Xml:
         text += "</kind>"
         if qos.flags & _QOS_KEEP_LAST and qos.depth:
             text += "<depth>" + str(qos.depth) + "</depth>"
-        return _variant(kind, _AS_XML, text + "</historyQos></topic></" + tag + "</dds>", parent)
+        return by_text(kind, _AS_XML, text + "</historyQos></topic></" + tag + "</dds>", parent)
 
     def service(
         self,
@@ -79,7 +79,7 @@ class Xml:
         text += (
             '"><request_topic_name>' + request_topic + "</request_topic_name><reply_topic_name>" + reply_topic
         )
-        return _variant(kind, _AS_XML, text + "</reply_topic_name></" + tag + "></dds>", parent)
+        return by_text(kind, _AS_XML, text + "</reply_topic_name></" + tag + "></dds>", parent)
 
 
 class Reference(Xml):
@@ -90,18 +90,18 @@ class Reference(Xml):
 
     def participant(self, name: str, domain: int) -> bytes:
         """A participant by its profile."""
-        return _participant(_BY_REFERENCE, self.profile, domain)
+        return participant_by_text(_BY_REFERENCE, self.profile, domain)
 
     def topic(self, name: str, type_name: str, parent: int) -> bytes:
         """A topic by its profile, ``chatter__t``."""
-        return _variant(_KIND_TOPIC, _BY_REFERENCE, _profile(name) + "__t", parent)
+        return by_text(_KIND_TOPIC, _BY_REFERENCE, _profile(name) + "__t", parent)
 
     def endpoint(
         self, kind: int, topic_id: int, qos: "EndpointQos", parent: int, name: str, type_name: str
     ) -> bytes:
         """A datawriter or a datareader by its profile, ``chatter__dw`` or ``chatter__dr``."""
         suffix = "__dw" if kind == _KIND_DATAWRITER else "__dr"
-        return _variant(kind, _BY_REFERENCE, _profile(name) + suffix, parent)
+        return by_text(kind, _BY_REFERENCE, _profile(name) + suffix, parent)
 
 
 def _profile(topic_name: str) -> str:
@@ -112,12 +112,14 @@ def _names(name: str, type_name: str) -> str:
     return "<name>" + name + "</name><dataType>" + type_name + "</dataType>"
 
 
-def _participant(form: int, text: str, domain: int) -> bytes:
+def participant_by_text(form: int, text: str, domain: int) -> bytes:
+    """The variant of a participant from its XML or reference (``form`` 2 or 1)."""
     variant = _text(_KIND_PARTICIPANT, form, text)
     return variant + bytes(len(variant) & 1) + pack("<h", domain)
 
 
-def _variant(kind: int, form: int, text: str, parent: int) -> bytes:
+def by_text(kind: int, form: int, text: str, parent: int) -> bytes:
+    """The variant of any other object from its XML or reference (``form`` 2 or 1)."""
     return _text(kind, form, text) + pack(">H", parent)
 
 
