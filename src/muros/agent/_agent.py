@@ -73,7 +73,11 @@ class Agent:
         """Adds a link; it opens when the agent runs, or now if it does. Raises LinkError if it cannot open then."""
         adapter = _LinkAdapter(self, link)
         if self._loop is not None:
-            link.open(adapter)
+            try:
+                link.open(adapter)
+            except BaseException:
+                self.core.detach(adapter.port, _now())
+                raise
         self.links.append(link)
         self._adapters[link] = adapter
         return link

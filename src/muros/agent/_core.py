@@ -40,6 +40,7 @@ from muros.xrce.constants import (
     KIND_REPLIER,
     KIND_REQUESTER,
     LITTLE_ENDIAN,
+    STATUS_ERR_INVALID_DATA,
     STATUS_ERR_RESOURCES,
     STATUS_NAMES,
     STATUS_OK,
@@ -396,7 +397,7 @@ class AgentCore:
                 "unknown-submessage",
                 who=session.who,
                 subject=f"id {kind}",
-                what=f"a submessage of {session.who} ignored",
+                what=f"{{n}} submessage{{s}} of {session.who} ignored",
                 why=f"submessage id {kind} with {n} B is not one a client sends",
                 remedy="Check the line for noise and the client for its version.",
             )
@@ -414,13 +415,13 @@ class AgentCore:
         if result == STATUS_OK and known is None and len(self.clients) >= self.limits.max_clients:
             result = STATUS_ERR_RESOURCES
         if result == STATUS_OK and asked.session_id & 0x7F == 0:
-            result = 0x85
+            result = STATUS_ERR_INVALID_DATA
         if result != STATUS_OK:
             self.report(
                 "client-refused",
                 who=port.link.describe(address),
                 subject=asked.key.hex(),
-                what=f"a client at {port.link.describe(address)} refused with {STATUS_NAMES[result]}",
+                what=f"{{n}} client{{s}} at {port.link.describe(address)} refused with {STATUS_NAMES[result]}",
                 why="it is not a DDS-XRCE 1 client, or the agent serves all the clients it may",
                 remedy="Update the client, or raise max_clients.",
             )
@@ -540,6 +541,7 @@ class AgentCore:
             self.findings.report(
                 code, who=who, subject=subject, what=what, why=why, remedy=remedy, now=now, n=n
             )
+        self._wake(self.now + _SUMMARY)
 
     def _dropped(
         self,
@@ -550,4 +552,4 @@ class AgentCore:
         remedy: str = "Check who sends to the agent.",
     ) -> None:
         who = port.link.describe(address)
-        self.report(code, who=who, what=f"a message from {who} dropped", why=why, remedy=remedy)
+        self.report(code, who=who, what=f"{{n}} message{{s}} from {who} dropped", why=why, remedy=remedy)

@@ -181,7 +181,7 @@ class AgentSession(SessionCore):
                 "sample-too-long",
                 who=self.who,
                 subject=reading.subject,
-                what=f"a sample of {reading.subject} to {self.who} dropped",
+                what=f"{{n}} sample{{s}} of {reading.subject} to {self.who} dropped",
                 why=f"{n} B are more than the {self.max_sample} B the agent sends to a client",
                 remedy="Raise max_sample_to_client, or send smaller samples.",
             )
@@ -190,7 +190,7 @@ class AgentSession(SessionCore):
             "best-effort-too-big",
             who=self.who,
             subject=reading.subject,
-            what=f"samples of {reading.subject} to {self.who} dropped",
+            what=f"{{n}} sample{{s}} of {reading.subject} to {self.who} dropped",
             why=f"{n} B do not fit its best-effort MTU of {self.mtu} B",
             remedy="Raise the client's MTU, or read on a reliable stream.",
         )
@@ -203,7 +203,7 @@ class AgentSession(SessionCore):
             self.core.report(
                 "too-many-streams",
                 who=self.who,
-                what=f"messages of {self.who} on stream 0x{stream_id:02X} dropped",
+                what=f"{{n}} message{{s}} of {self.who} on stream 0x{stream_id:02X} dropped",
                 why=f"it uses {len(self.inputs)} streams already",
                 remedy="Use fewer streams, or raise max_streams.",
             )
@@ -222,7 +222,7 @@ class AgentSession(SessionCore):
             "sample-too-long",
             who=self.who,
             subject=f"stream 0x{stream_id:02X}",
-            what=f"a sample of {self.who} dropped",
+            what=f"{{n}} sample{{s}} of {self.who} dropped",
             why=f"its fragments make {n} B, more than the {self.largest} B that are joined",
             remedy="Raise max_sample, or write smaller samples.",
         )
@@ -453,7 +453,7 @@ class AgentSession(SessionCore):
             code,
             who=self.who,
             subject=subject,
-            what=f"data of {self.who} for {subject} dropped",
+            what=f"{{n}} sample{{s}} of {self.who} for {subject} dropped",
             why=why,
             remedy=remedy,
         )
@@ -465,7 +465,7 @@ class AgentSession(SessionCore):
             "malformed",
             who=self.who,
             subject=name,
-            what=f"{name} of {self.who} dropped",
+            what=f"{{n}} {name} of {self.who} dropped",
             why=why,
             remedy="Check the line for noise and the client for its version.",
         )
