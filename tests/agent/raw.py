@@ -238,6 +238,12 @@ class Raw:
         assert self.make(0x10 | kind, variant, REUSE | REPLACE) == 0
         return self
 
+    def service_kinds(self) -> None:
+        """Makes a requester and a replier in the participant that is there."""
+        for kind in (KIND_REQUESTER, KIND_REPLIER):
+            variant = create.service(kind, "/x", "Q", "P", "rq/xRequest", "rr/xReply", PARTICIPANT)
+            assert self.make(0x10 | kind, variant) == 0
+
     # What the agent sent
 
     def got(self) -> list[Got]:

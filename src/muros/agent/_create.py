@@ -133,6 +133,12 @@ def build(
             )
         participant = parent if isinstance(parent, ParticipantProxy) else parent.parent
         assert participant is not None
+        if participant.participant.closed:
+            raise Refused(
+                STATUS_ERR_DDS_ERROR,
+                "its participant was deleted",
+                "Create the participant and what is in it anew.",
+            )
         if isinstance(entity, TopicEntity):
             return TopicProxy(object_id, entity, participant, Topic(entity.name, entity.type_name or ""))
         if isinstance(entity, (PublisherEntity, SubscriberEntity)):
