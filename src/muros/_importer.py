@@ -108,14 +108,22 @@ def _known(package: str) -> bool:
     if api is None and (package.endswith(_ENDINGS) or os.environ.get(_ENV)):
         api = import_module("muros.interfaces")
     packages = getattr(api, "packages", None)  # not there yet while it is being imported
-    return packages is not None and package in packages()
+    try:
+        return packages is not None and package in packages()
+    except ValueError:  # a wrong $MUROS_INTERFACES: said to those who want interfaces, and to nobody else
+        if package.endswith(_ENDINGS):
+            raise
+        return False
 
 
 def _is_users(package: str) -> bool:
     """Whether a folder of the user has definitions of that package, at a glance."""
     registry = getattr(sys.modules.get("muros.interfaces"), "registry", None)
     if registry is not None:
-        return package in registry().user_packages()
+        try:
+            return package in registry().user_packages()
+        except ValueError:
+            return False
     folders = os.environ.get(_ENV)
     return bool(folders) and any(
         os.path.basename(os.path.normpath(folder)) == package or os.path.isdir(os.path.join(folder, package))

@@ -310,6 +310,7 @@ def test_publishing_and_receiving_numbers_leaves_the_heap_alone(tmp_path: Path) 
         ("sensor_msgs/msg/PointCloud2", 3),
         ("diagnostic_msgs/msg/DiagnosticArray", 4),
         ("tf2_msgs/msg/TFMessage", 6),
+        ("sensor_msgs/msg/JointState", 2),
     ],
 )
 def test_a_class_fits_its_budget(name: str, nested: int) -> None:

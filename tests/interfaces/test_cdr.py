@@ -6,6 +6,7 @@ import copy
 import pickle
 import tracemalloc
 from array import array
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -418,3 +419,25 @@ def test_names_that_python_or_muros_needs_get_an_underscore(tmp_path: Path) -> N
 
 def test_definition_is_a_message() -> None:
     assert isinstance(interfaces.definition("std_msgs/msg/Int32"), Message)
+
+
+def test_adding_a_folder_keeps_the_classes_there_are(tmp_path: Path) -> None:
+    before = message("std_msgs/msg/Header")
+    (tmp_path / "late_msgs" / "msg").mkdir(parents=True)
+    (tmp_path / "late_msgs" / "msg" / "A.msg").write_text("Header h\n")
+    interfaces.add_path(tmp_path)
+    assert type(message("late_msgs/msg/A")().h) is before is message("std_msgs/msg/Header")
+    interfaces.add_path(tmp_path)  # again, unchanged
+    assert message("std_msgs/msg/Header") is before
+    (tmp_path / "other" / "late_msgs" / "msg").mkdir(parents=True)
+    (tmp_path / "other" / "late_msgs" / "msg" / "A.msg").write_text("int8 b\n")
+    interfaces.add_path(tmp_path / "other")
+    assert message("late_msgs/msg/A")(b=1).b == 1
+
+
+def test_threads_share_one_class() -> None:
+    with ThreadPoolExecutor(8) as pool:
+        made = list(
+            pool.map(lambda _: message("visualization_msgs/msg/InteractiveMarker", "kilted"), range(8))
+        )
+    assert len(set(made)) == 1

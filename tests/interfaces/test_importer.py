@@ -129,3 +129,7 @@ try: import std_msgs.msg
 except InterfaceError as error: print(error)
 """
     assert python(program, MUROS_INTERFACES="/nowhere") == "$MUROS_INTERFACES: /nowhere: no such folder\n"
+    others = (
+        "import muros.interfaces, json, wave\ntry: import no_such_thing\nexcept ImportError: print('as ever')"
+    )
+    assert python(others, MUROS_INTERFACES="/nowhere") == "as ever\n"

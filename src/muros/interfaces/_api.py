@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from threading import RLock
 from typing import Any, ClassVar, cast
 
 from muros.interfaces import _hashes, _host
@@ -32,6 +33,7 @@ class ActionType:
     FeedbackMessage: ClassVar[type[Any]]
 
 
+_lock = RLock()  # so that two threads never get two classes of one type
 _registries: dict[str | None, Registry] = {}
 _classes: dict[tuple[Registry, str], type[Any]] = {}
 _paths: list[str | os.PathLike[str]] = []
@@ -39,17 +41,8 @@ _paths: list[str | os.PathLike[str]] = []
 
 def registry(distro: str | None = None) -> Registry:
     """The registry that the functions of this package use for a distribution (default: see the package)."""
-    if distro not in _registries:
-        made = Registry(distro)
-        for folder in filter(None, os.environ.get(ENV_PATHS, "").split(os.pathsep)):
-            try:
-                made.add_path(folder)
-            except InterfaceError as error:
-                raise InterfaceError(f"${ENV_PATHS}: {error}") from None
-        for path in _paths:
-            made.add_path(path)
-        _registries[distro] = made
-    return _registries[distro]
+    found = _registries.get(distro)
+    return found or _new_registry(distro)
 
 
 def add_path(folder: str | os.PathLike[str]) -> tuple[str, ...]:
@@ -59,13 +52,18 @@ def add_path(folder: str | os.PathLike[str]) -> tuple[str, ...]:
     definitions go before standard ones of the same name; classes made earlier stay as they are. Raises
     :class:`InterfaceError` if the folder has none.
     """
-    found = registry().add_path(folder)
-    for distro, other in _registries.items():
-        if distro is not None:
-            other.add_path(folder)
-    _paths.append(os.path.abspath(os.path.expanduser(folder)))
-    _classes.clear()
-    return found
+    with _lock:
+        home = registry()
+        before = home.user_files()
+        found = home.add_path(folder)
+        changed = {name for name, path in home.user_files().items() if before.get(name) != path}
+        for distro, other in _registries.items():
+            if distro is not None:
+                other.add_path(folder)
+        _paths.append(os.path.abspath(os.path.expanduser(folder)))
+        if any(name in changed for _, name in _classes):
+            _classes.clear()  # something that was used got another definition: nothing made of it may be used again
+        return found
 
 
 def message(name: str, distro: str | None = None) -> type[Any]:
@@ -78,9 +76,11 @@ def message(name: str, distro: str | None = None) -> type[Any]:
     full = "/".join(split_type(name))
     made = _classes.get((home, full))
     if made is None:
-        described = home.message(full)
-        made = _host.build(home, described, lambda nested: message(nested, distro))
-        _classes[home, full] = made
+        with _lock:
+            made = _classes.get((home, full))
+            if made is None:
+                made = _host.build(home, home.message(full), lambda nested: message(nested, distro))
+                _classes[home, full] = made
     return made
 
 
@@ -88,38 +88,40 @@ def service(name: str, distro: str | None = None) -> type[ServiceType]:
     """The class of a service, ``example_interfaces/srv/AddTwoInts``, with ``.Request`` and ``.Response``."""
     home = registry(distro)
     full = "/".join(split_type(name, "srv"))
-    if (home, full) not in _classes:
-        described = home.definition(full)
-        if not isinstance(described, model.Service):
-            raise InterfaceError(f"{full} is no service")
-        _classes[home, full] = _made(
-            full,
-            ServiceType,
-            Request=message(described.request.name, distro),
-            Response=message(described.response.name, distro),
-        )
-    return cast("type[ServiceType]", _classes[home, full])
+    with _lock:
+        if (home, full) not in _classes:
+            described = home.definition(full)
+            if not isinstance(described, model.Service):
+                raise InterfaceError(f"{full} is no service")
+            _classes[home, full] = _made(
+                full,
+                ServiceType,
+                Request=message(described.request.name, distro),
+                Response=message(described.response.name, distro),
+            )
+        return cast("type[ServiceType]", _classes[home, full])
 
 
 def action(name: str, distro: str | None = None) -> type[ActionType]:
     """The class of an action, ``example_interfaces/action/Fibonacci``, with ``.Goal``, ``.SendGoal`` and so on."""
     home = registry(distro)
     full = "/".join(split_type(name, "action"))
-    if (home, full) not in _classes:
-        described = home.definition(full)
-        if not isinstance(described, model.Action):
-            raise InterfaceError(f"{full} is no action")
-        _classes[home, full] = _made(
-            full,
-            ActionType,
-            Goal=message(described.goal.name, distro),
-            Result=message(described.result.name, distro),
-            Feedback=message(described.feedback.name, distro),
-            SendGoal=service(described.send_goal.name, distro),
-            GetResult=service(described.get_result.name, distro),
-            FeedbackMessage=message(described.feedback_message.name, distro),
-        )
-    return cast("type[ActionType]", _classes[home, full])
+    with _lock:
+        if (home, full) not in _classes:
+            described = home.definition(full)
+            if not isinstance(described, model.Action):
+                raise InterfaceError(f"{full} is no action")
+            _classes[home, full] = _made(
+                full,
+                ActionType,
+                Goal=message(described.goal.name, distro),
+                Result=message(described.result.name, distro),
+                Feedback=message(described.feedback.name, distro),
+                SendGoal=service(described.send_goal.name, distro),
+                GetResult=service(described.get_result.name, distro),
+                FeedbackMessage=message(described.feedback_message.name, distro),
+            )
+        return cast("type[ActionType]", _classes[home, full])
 
 
 def load(name: str, distro: str | None = None) -> type[Any]:
@@ -188,6 +190,21 @@ def source(name: str, distro: str | None = None) -> str:
     """The Python source of the generated class of a message, for reading."""
     home = registry(distro)
     return _host.source(home, home.message("/".join(split_type(name))))
+
+
+def _new_registry(distro: str | None) -> Registry:
+    with _lock:
+        if distro not in _registries:
+            made = Registry(distro)
+            for folder in filter(None, os.environ.get(ENV_PATHS, "").split(os.pathsep)):
+                try:
+                    made.add_path(folder)
+                except InterfaceError as error:
+                    raise InterfaceError(f"${ENV_PATHS}: {error}") from None
+            for path in _paths:
+                made.add_path(path)
+            _registries[distro] = made
+        return _registries[distro]
 
 
 def _made(full: str, base: type[Any], **members: object) -> type[Any]:

@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from muros.interfaces._encoder import Code, format_text
 from muros.interfaces._layout import (
     START,
+    At,
     Block,
     Dummy,
     Leaf,
@@ -43,32 +44,83 @@ class Memos:
         return list(self._names.values())
 
 
-def size_lines(found: Sequence[Leaf], memos: Memos) -> list[str]:
+class Shared:
+    """The messages that occur in several sequences of one message: their code becomes functions of the module."""
+
+    def __init__(self, found: Sequence[Leaf], blank: Blank) -> None:
+        self._blank = blank
+        self._bodies: dict[str, tuple[Leaf, ...]] = {}
+        self._often: set[str] = set()
+        self._count(found)
+
+    def __contains__(self, type_name: str) -> bool:
+        return type_name in self._often
+
+    def function(self, verb: str, type_name: str) -> str:
+        """The name of the function that sizes, writes or reads one element."""
+        return f"_{verb}_{type_name.replace('/', '_')}"
+
+    def lines(self) -> list[str]:
+        """All functions, as lines of a module."""
+        lines: list[str] = []
+        for name in sorted(self._often):
+            body = self._bodies[name]
+            sizer, writer, reader = _Sizer(None, self), _Writer(None, self), _Reader(self._blank, self)
+            for verb, arguments, code in (
+                ("size", "m, p", sizer.element(body)),
+                ("write", "m, buf, p, off", writer.element(body)),
+                ("read", "m, buf, p, off, e", reader.element(body)),
+            ):
+                lines += [f"def {self.function(verb, name)}({arguments}):", *(f"    {line}" for line in code)]
+        return lines
+
+    def _count(self, found: Sequence[Leaf]) -> None:
+        for leaf in found:
+            if isinstance(leaf, Many) and leaf.type_name in self._bodies:
+                self._often.add(leaf.type_name)
+            elif isinstance(leaf, Many):
+                if leaf.type_name:
+                    self._bodies[leaf.type_name] = leaf.body
+                self._count(leaf.body)
+
+
+def size_lines(found: Sequence[Leaf], memos: Memos, shared: Shared) -> list[str]:
     """The body of ``size(self)``."""
     size = fixed_size(found)
     if size is not None:
         return [f"return {size}"]
-    return _Sizer(memos).run(found)
+    return _Sizer(memos, shared).run(found)
 
 
-def write_lines(found: Sequence[Leaf], memos: Memos) -> list[str]:
+def write_lines(found: Sequence[Leaf], memos: Memos, shared: Shared) -> list[str]:
     """The body of ``write(self, buf, off)``."""
-    return _Writer(memos).run(found)
+    return _Writer(memos, shared).run(found)
 
 
-def read_lines(found: Sequence[Leaf], blank: Blank) -> list[str]:
+def read_lines(found: Sequence[Leaf], blank: Blank, shared: Shared) -> list[str]:
     """The body of ``read(self, buf, off, n)``; ``blank`` gives the lines that make an element to be filled."""
-    return _Reader(blank).run(found)
+    return _Reader(blank, shared).run(found)
 
 
 class _Walker:
     """What sizing, writing and reading share: the position as ``base + const`` and the walk over the leaves."""
 
-    def __init__(self, base: str) -> None:
+    def __init__(self, base: str, shared: Shared) -> None:
         self.code = Code("self")
+        self._shared = shared
         self._at = START
         self._base = base
         self._const = 0
+
+    def element(self, found: Sequence[Leaf]) -> list[str]:
+        """The body of a function for one element ``m`` at ``p``, of whose alignment nothing is known."""
+        self.code = Code("m")
+        self._at = At(1, 0)
+        self._base = "p"
+        self._walk(found)
+        self._flush()
+        self.code.line(f"return {self._position()}")
+        return self.code.lines
 
     def _walk(self, found: Sequence[Leaf]) -> None:
         for leaf in found:
@@ -91,15 +143,20 @@ class _Walker:
             self.code.line(f"p = {expression}")
         self._base, self._const = "p", 0
 
-    def _loop(self, body: Sequence[Leaf], element: str, head: str, start: Sequence[str] = ()) -> None:
+    def _loop(
+        self, leaf: Many, element: str, head: str, function: str, arguments: str, start: Sequence[str] = ()
+    ) -> None:
         """A loop over the elements of an array or sequence, which begin at the present position."""
         self._moved(self._position())
         self.code.line(head)
         saved = self.code.enter(element)
         for line in start:
             self.code.line(line)
-        self._at = loop(body, self._at)
-        self._walk(body)
+        self._at = loop(leaf.body, self._at)
+        if leaf.type_name in self._shared:
+            self._moved(f"{self._shared.function(function, leaf.type_name)}({element}, {arguments})")
+        else:
+            self._walk(leaf.body)
         self._flush()
         self._moved(self._position())
         self.code.leave(saved)
@@ -109,8 +166,8 @@ class _Walker:
 
 
 class _Sizer(_Walker):
-    def __init__(self, memos: Memos) -> None:
-        super().__init__("")
+    def __init__(self, memos: Memos | None, shared: Shared) -> None:
+        super().__init__("", shared)
         self._memos = memos
 
     def run(self, found: Sequence[Leaf]) -> list[str]:
@@ -147,7 +204,7 @@ class _Sizer(_Walker):
                     self._skip(4, 4)
                     self._at = self._at.aligned(4).moved(4)
                 element = self.code.temp("e")
-                self._loop(leaf.body, element, f"for {element} in {items}:")
+                self._loop(leaf, element, f"for {element} in {items}:", "size", "p")
 
     def _skip(self, align: int, size: int) -> None:
         pad = self._at.pad(align)
@@ -158,8 +215,8 @@ class _Sizer(_Walker):
 
 
 class _Writer(_Walker):
-    def __init__(self, memos: Memos) -> None:
-        super().__init__("off")
+    def __init__(self, memos: Memos | None, shared: Shared) -> None:
+        super().__init__("off", shared)
         self._memos = memos
         self._run: list[str] = []
         self._values: list[str] = []
@@ -236,7 +293,7 @@ class _Writer(_Walker):
             self._flush()
             self._at = self._at.aligned(4).moved(4)
         element = self.code.temp("e")
-        self._loop(leaf.body, element, f"for {element} in {items}:")
+        self._loop(leaf, element, f"for {element} in {items}:", "write", "buf, p, off")
 
     def _value(self, align: int, chunk: str, value: str, size: int) -> None:
         pad = self._at.pad(align)
@@ -272,8 +329,8 @@ class _Writer(_Walker):
 
 
 class _Reader(_Walker):
-    def __init__(self, blank: Blank) -> None:
-        super().__init__("off")
+    def __init__(self, blank: Blank, shared: Shared) -> None:
+        super().__init__("off", shared)
         self._blank = blank
         self._run: list[tuple[str, str, int]] = []  # struct chunk ("" for padding), target, size
         self._later: list[str] = []
@@ -361,7 +418,7 @@ class _Reader(_Walker):
         items, element = self.code.temp("l"), self.code.temp("e")
         self.code.line(f"{items} = []")
         start = self._blank(leaf.type_name, element) if leaf.type_name else []
-        self._loop(leaf.body, element, f"for _ in range({count}):", start)
+        self._loop(leaf, element, f"for _ in range({count}):", "read", "buf, p, off, e", start)
         self.code.indent += 1
         self.code.line(f"{items}.append({element})")
         self.code.indent -= 1
@@ -426,10 +483,10 @@ def _integer(code: str, size: int, at: str) -> str:
     return f"integer(buf, {at}, {size}, {int(code.islower())})"
 
 
-def _bytes_of(code: Code, leaf: Text, memos: Memos) -> str:
+def _bytes_of(code: Code, leaf: Text, memos: Memos | None) -> str:
     """The expression of a string's bytes: kept with the message, or made anew for an element of a sequence."""
     value = code.place(leaf.path)
-    if code.indent == 0:  # outside loops
+    if memos is not None and code.indent == 0:  # outside loops
         return f"encoded({value}, self.{memos.name(leaf.path)})"
     return f"({value}.encode() if isinstance({value}, str) else {value})"
 

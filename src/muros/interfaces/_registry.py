@@ -36,6 +36,7 @@ class Registry:
         self._wanted = distro
         self._distro = ""
         self._files: dict[str, Path] = {}
+        self._user_packages: frozenset[str] = frozenset()
         self._share: dict[str, Path] | None = None
         self._found: dict[str, Definition] = {}
         self._checked: dict[str, Definition] = {}
@@ -63,6 +64,7 @@ class Registry:
                 f"{os.fspath(folder)}: no definitions found: expected package/msg/*.msg or msg/*.msg"
             )
         self._files.update(files)
+        self._user_packages |= {name.partition("/")[0] for name in files}
         self._found.clear()
         self._checked.clear()
         return tuple(sorted({name.partition("/")[0] for name in files}))
@@ -73,7 +75,11 @@ class Registry:
 
     def user_packages(self) -> frozenset[str]:
         """The packages found in folders of the user."""
-        return frozenset(name.partition("/")[0] for name in self._files)
+        return self._user_packages
+
+    def user_files(self) -> dict[str, Path]:
+        """The definitions found in folders of the user: full name -> file."""
+        return dict(self._files)
 
     def names(self, package: str | None = None) -> list[str]:
         """The full names of all definitions, sorted, derived messages left out."""

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from muros.interfaces import _model as model
 from muros.interfaces._api import registry as default_registry
-from muros.interfaces._board_code import Memos, read_lines, size_lines, write_lines
+from muros.interfaces._board_code import Memos, Shared, read_lines, size_lines, write_lines
 from muros.interfaces._layout import Leaf, Many, Text, leaves
 from muros.interfaces._model import (
     PRIMITIVES,
@@ -158,21 +158,28 @@ class _Work:
             raise InterfaceError(f"{message.name}: wstring is not supported on boards; use string")
 
     def _source(self, path: str, messages: list[Message]) -> str:
-        classes = [self._class(message) for message in messages]
-        body = "\n\n".join([*classes, *self._tails.get(path, [])])
+        functions: dict[str, None] = {}  # in order, each once
+        classes = [self._class(message, functions) for message in messages]
+        body = "\n\n".join([*functions, *classes, *self._tails.get(path, [])])
         head = _imports(body)
         hidden = {name for message in messages for name in _hidden(message)}
         head += [f"_{name} = {name}" for name in sorted(hidden) if f"_{name}(" in body]
         return "\n".join([*head, "", "", body] if head else [body])
 
-    def _class(self, message: Message) -> str:
+    def _class(self, message: Message, functions: dict[str, None]) -> str:
         found = leaves(message, self.registry.message)
         memos = Memos()
         methods: list[str] = []
         if message.name in self._full:
-            methods += ["    def size(self):", *_indented(size_lines(found, memos))]
-            methods += ["    def write(self, buf, off):", *_indented(write_lines(found, memos))]
-            methods += ["    def read(self, buf, off, n):", *_indented(read_lines(found, self._skeleton))]
+            shared = Shared(found, self._skeleton)
+            methods += ["    def size(self):", *_indented(size_lines(found, memos, shared))]
+            methods += ["    def write(self, buf, off):", *_indented(write_lines(found, memos, shared))]
+            methods += [
+                "    def read(self, buf, off, n):",
+                *_indented(read_lines(found, self._skeleton, shared)),
+            ]
+            if shared.lines():
+                functions["\n".join(shared.lines()) + "\n"] = None
         lines = [f"class {_short(message.name)}:", f'    TYPE = "{message.name}"']
         lines += [f"    {attribute(c.name)} = {_literal(c.value)}" for c in message.constants]
         if message.fields:
