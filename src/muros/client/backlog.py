@@ -51,8 +51,8 @@ class Backlog:
         if writer.status or (not ready and not (stream.reliable and session.queue)):
             return self._refuse(_OFFLINE, _PROBLEM_OFFLINE, writer, n)
         large = n + _HEAD > stream.capacity()
-        waiting = len(self.items) + (1 if self._cut else 0)
-        if ready and not large and not (stream.reliable and waiting):
+        waiting = len(self.items)
+        if ready and not large and not (stream.reliable and (waiting or self._cut)):
             at = stream.reserve(n + _HEAD)
             if at >= 0:
                 self._write(stream.buf, at, writer, message, n)
@@ -62,7 +62,7 @@ class Backlog:
             if large:
                 return self._refuse(_TOO_LARGE, _PROBLEM_TOO_LARGE, writer, n)
             return self._refuse(_FULL, _PROBLEM_FULL, writer, n)
-        if waiting >= (session.queue or (1 if large else 0)):
+        if waiting >= (session.queue or (1 if large or self._cut else 0)):
             return self._refuse(_FULL, _PROBLEM_FULL, writer, n)
         data = bytearray(2 * _HEAD + n)
         self._write(data, 0, writer, message, n)

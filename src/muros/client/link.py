@@ -10,8 +10,9 @@ Theory of operation. The connection walks through four states, by the table ``_N
   anew, or our address changed), the session connects again and sends once more what was never acknowledged.
 
 A CREATE_CLIENT that the network repeats or delays makes the reference agent begin its streams again behind our back.
-Such a session is out of step: the agent acknowledges numbers that were never sent. When that happens ``_FOREIGN``
-times in a row, the session connects again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2, 8.3.5 and 8.4.
+Such a session is out of step: the agent acknowledges numbers of another one. When it says twice that it waits for
+number 0, although that is long acknowledged, or ``_FOREIGN`` times in a row anything else that cannot be, the session
+connects again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2, 8.3.5 and 8.4.
 """
 
 from muros.compat import const, ticks_add, ticks_diff, ticks_ms, urandom
@@ -106,6 +107,7 @@ class Link(SessionCore):
         self._heard = 0
         self._tries = 0
         self._ping = 0
+        self._suspect = False
 
     def spin_once(self, now: "int | None" = None) -> int:
         """Takes what has come and does what is due; returns the number of messages taken. Never waits."""
@@ -199,8 +201,26 @@ class Link(SessionCore):
 
     def deliver(self, buf: "Buffer", off: int, n: int) -> None:
         """Takes a message of the transport."""
+        size = len(self.head)
+        if self.login and (n <= size or buf[off + size] != _STATUS_AGENT):
+            return  # it is about the streams of the session that was
         if self.receive(buf, off, n, self.now):
             self._heard = self.now
+
+    def _on_acknack(self, buf: "Buffer", at: int, flags: int) -> None:
+        super()._on_acknack(buf, at, flags)
+        if self.foreign == 0:
+            self._suspect = False
+        elif buf[at] == 0 and buf[at + 1] == 0:
+            self._suspect_reset()
+
+    def _suspect_reset(self) -> None:
+        """The agent may have begun its streams again: a message on the reliable one has it tell its numbers."""
+        if self._suspect and self.foreign:
+            self.foreign = _FOREIGN
+        elif not self._suspect:
+            self._suspect = True
+            self.submit(_GET_INFO, _LITTLE_ENDIAN, self.requests(1), _OBJECT_AGENT, b"\2\0\0\0")
 
     def _send(self, buf: "Buffer", off: int, n: int) -> None:
         try:
@@ -276,13 +296,12 @@ class Link(SessionCore):
 
     def _on_status_agent(self, status: int) -> None:
         if not self.login:
-            # The network repeated our CREATE_CLIENT, so the agent's streams may have begun again. A message on the
-            # reliable stream has the agent acknowledge, and its numbers tell.
-            self.submit(_GET_INFO, _LITTLE_ENDIAN, self.requests(1), _OBJECT_AGENT, b"\2\0\0\0")
+            self._suspect_reset()  # the network repeated our CREATE_CLIENT
         elif status < 0x80:
             self.login = False
             self._attempt = b""
             self.foreign = 0
+            self._suspect = False
             self._heard = self.now
             self.accepted()
             self.happened(_ACCEPTED)
