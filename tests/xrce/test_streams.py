@@ -1,0 +1,179 @@
+"""Streams of hosts behave as those of boards, message for message; queues lose nothing behind the window."""
+
+import struct
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from muros.xrce._types import Buffer
+from muros.xrce.inputs import ReliableInput
+from muros.xrce.outputs import BestEffortOutput, ReliableOutput
+from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableInput, QueuedReliableOutput
+
+HEAD = b"\x81\0\0\0"
+starts = st.sampled_from([0, 65500, 65530, 65535])
+windows = st.sampled_from([1, 2, 4, 16])
+
+
+class Line:
+    """Keeps what is sent."""
+
+    def __init__(self) -> None:
+        self.sent: list[bytes] = []
+
+    def send(self, buf: Buffer, off: int, n: int) -> None:
+        """Keeps a message."""
+        self.sent.append(bytes(buf[off : off + n]))
+
+
+def submessage(body: bytes) -> bytes:
+    return struct.pack("<BBH", 7, 1, len(body)) + body
+
+
+def feed(stream: Any, number: int, content: bytes) -> list[bytes]:
+    """A message arrives; what is handled because of it."""
+    number &= 0xFFFF
+    what = stream.accept(number)
+    if what == 2:
+        stream.store(number, content, 0, len(content))
+    if what != 1:
+        return []
+    return [content, *behind(stream)]
+
+
+def behind(stream: Any) -> list[bytes]:
+    """What is kept behind the message just handled."""
+    handled = []
+    while stream.advance():
+        handled.append(bytes(stream.buf[stream.base : stream.base + stream.size]))
+    return handled
+
+
+steps = st.lists(
+    st.tuples(st.just("message"), st.integers(-3, 18), st.binary(min_size=1, max_size=8))
+    | st.tuples(st.just("heartbeat"), st.integers(-3, 20), st.integers(0, 20))
+    | st.tuples(st.just("far"), st.integers(-40000, 40000), st.integers(0, 40000))
+    | st.tuples(st.just("reset"), st.just(0), st.just(0)),
+    max_size=60,
+)
+
+
+@given(starts, windows, steps)
+def test_receivers_of_boards_and_hosts_are_alike(start: int, window: int, told: list[Any]) -> None:
+    streams: list[Any] = [ReliableInput(0x80, 8, window), QueuedReliableInput(0x80, 0xFFFF, window)]
+    for stream in streams:
+        stream.expected = stream.end = start
+    for what, first, second in told:
+        results = []
+        for stream in streams:
+            handled: list[bytes] = []
+            if what == "message":
+                handled = feed(stream, stream.expected + first, second)
+            elif what == "reset":
+                stream.reset()
+            else:
+                stream.announce(stream.expected + first & 0xFFFF, stream.expected + first + second & 0xFFFF)
+                if stream.ready():
+                    handled = [bytes(stream.buf[stream.base : stream.base + stream.size]), *behind(stream)]
+            results.append((handled, stream.expected, stream.end, stream.missing(), stream.stored))
+        assert results[0] == results[1]
+        assert len(streams[1]._early) == streams[1].stored.bit_count() <= window
+        assert streams[1].missing() & streams[1].stored == 0
+
+
+acknowledgements = st.tuples(st.integers(-3, 20), st.integers(0, 0xFFFF), st.integers(0, 40))
+
+
+@given(starts, windows, st.lists(st.binary(max_size=12) | acknowledgements, max_size=60))
+def test_senders_of_boards_and_hosts_are_alike(start: int, window: int, told: list[Any]) -> None:
+    lines = [Line(), Line()]
+    board = ReliableOutput(0x80, 20, bytearray(HEAD), window, 100)
+    host = QueuedReliableOutput(0x80, 20, bytearray(HEAD), window, 100)
+    now = 1000
+    for stream in (board, host):
+        stream.next = stream.first = stream.sent = start
+    for one in told:
+        if isinstance(one, bytes):
+            assert (board.free() > 0) == (host.free() > 0)
+            if host.free() > 0:
+                at = board.reserve(len(one))
+                board.buf[at : at + 4 + len(one)] = submessage(one)
+                board.flush(lines[0].send, now)
+                assert host.post(submessage(one), lines[1].send, now)
+        else:
+            ahead, bitmap, wait = one
+            now += wait
+            first = board.first + ahead & 0xFFFF
+            taken = [board.acknowledge(first, bitmap, lines[0].send, now)]
+            taken.append(host.acknowledge(first, bitmap, lines[1].send, now))
+            assert taken[0] == taken[1]
+        assert lines[0].sent == lines[1].sent
+        assert (board.first, board.next, board.sent, board.resends) == (
+            host.first,
+            host.next,
+            host.sent,
+            host.resends,
+        )
+        assert board.heartbeat_due(now) == host.heartbeat_due(now)
+        assert board.idle() == host.idle()
+    shown = [Line(), Line()]
+    board.unacknowledged(shown[0].send)
+    host.unacknowledged(shown[1].send)
+    assert shown[0].sent == shown[1].sent
+
+
+@given(
+    starts, windows, st.lists(st.binary(max_size=12), max_size=60), st.lists(st.integers(0, 5), max_size=80)
+)
+def test_what_waits_behind_the_window_goes_in_order(
+    start: int, window: int, bodies: list[bytes], acknowledged: list[int]
+) -> None:
+    line = Line()
+    stream = QueuedReliableOutput(0x80, 20, bytearray(HEAD), window, 100)
+    stream.next = stream.first = stream.sent = start
+    for body in bodies:
+        assert stream.post(submessage(body), line.send, 0)
+    for count in [*acknowledged, *[window] * len(bodies)]:
+        in_flight = stream.next - stream.first & 0xFFFF
+        assert in_flight <= window
+        assert in_flight + stream.waiting() <= len(bodies)
+        stream.acknowledge(stream.first + min(count, in_flight) & 0xFFFF, 0, line.send, 0)
+    assert [message[8:] for message in line.sent] == bodies
+    assert [message[2] | message[3] << 8 for message in line.sent] == [
+        start + n & 0xFFFF for n in range(len(bodies))
+    ]
+    assert stream.idle()
+    assert stream._kept is None
+    assert stream._waiting is None
+
+
+def test_a_queue_that_is_reset_forgets_what_waits() -> None:
+    line = Line()
+    stream = QueuedReliableOutput(0x80, 20, bytearray(HEAD), 2, 100)
+    for _ in range(5):
+        stream.post(submessage(b"old"), line.send, 0)
+    assert stream.waiting() == 3
+    stream.reset()
+    assert stream.waiting() == 0
+    assert stream.free() == 2
+    line.sent.clear()
+    stream.post(submessage(b"new"), line.send, 0)
+    stream.acknowledge(1, 0, line.send, 0)
+    assert line.sent == [b"\x81\x80\0\0" + submessage(b"new")]
+
+
+@given(st.lists(st.binary(max_size=20), max_size=20), st.sampled_from([0, 65530]))
+def test_best_effort_of_boards_and_hosts_are_alike(bodies: list[bytes], start: int) -> None:
+    lines = [Line(), Line()]
+    board = BestEffortOutput(1, 20, bytearray(HEAD))
+    host = QueuedBestEffortOutput(1, 20, bytearray(HEAD))
+    board.next = host.next = start
+    for body in bodies:
+        at = board.reserve(len(body))
+        if at >= 0:
+            board.buf[at : at + 4 + len(body)] = submessage(body)
+            board.flush(lines[0].send, 0)
+        assert host.post(submessage(body), lines[1].send, 0) == (at >= 0)
+    assert lines[0].sent == lines[1].sent
+    assert board.next == host.next
