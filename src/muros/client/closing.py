@@ -1,6 +1,6 @@
 """The ends: entities are destroyed, sessions take leave of their agent."""
 
-from muros.client.link import LOST, WAITING
+from muros.client.link import WAITING
 from muros.client.session import head
 from muros.compat import const
 
@@ -55,7 +55,7 @@ def close(session: "Session") -> None:
     transport = session.transport
     try:
         for _ in range(_ATTEMPTS):
-            if session.login or session.state == LOST:
+            if session.login or not session.up:
                 break
             leave(session)
             transport.wait(_PATIENCE)

@@ -36,8 +36,8 @@ class Custom:
         wait: "Callable[[int], object] | None" = None,
     ) -> None:
         self.mtu = mtu
-        self.close = close
-        self.send = write
+        self._close = close
+        self._write = write
         self._open = open
         self._read = read
         self._wait = wait
@@ -49,11 +49,19 @@ class Custom:
             from muros.xrce.serial import SerialDeframer, SerialFramer
 
             self.deframer = SerialDeframer(source, mtu, self._on_frame)
-            self.send = SerialFramer(source, destination, lambda buf, n: write(buf, 0, n)).send
+            self._write = SerialFramer(source, destination, lambda buf, n: write(buf, 0, n)).send
 
     def open(self) -> bool:
         """Opens the way."""
         return bool(self._open())
+
+    def close(self) -> None:
+        """Closes the way."""
+        self._close()
+
+    def send(self, buf: "Buffer", off: int, n: int) -> None:
+        """Sends a message."""
+        self._write(buf, off, n)
 
     def receive(self, deliver: "Deliver") -> int:
         """Delivers what has come, from up to 16 reads."""
