@@ -1,6 +1,6 @@
-"""What the reference agent is known to do badly, one test for each: here it works.
+"""What the reference agent is known to do badly, one test for each: wedged readers, lost answers, ghosts and more.
 
-The observations are in docs/protocol/xrce.md: wedged readers, lost answers, ghosts, endless reads.
+Here all of it works.
 """
 
 from itertools import pairwise
@@ -253,6 +253,28 @@ def test_a_lost_client_that_comes_back_goes_on() -> None:
     reader.acknack(reader.expected[STREAM_RELIABLE])
     assert reader.samples() == [bytes((n,)) for n in range(1, 41)]
     assert len(bench.core.clients) == 2
+
+
+def test_an_idle_agent_sleeps() -> None:
+    """Nothing to do, nothing to wake up for; a silent client that owes acknowledgements wakes it once a second."""
+    bench = Bench()
+    client = Raw(bench).tree()
+    client.read()
+    bench.advance(1_000)
+    client.got()
+    bench.advance(2_000)
+    assert bench.core.tick(bench.now) is None
+    client.write(b"never acknowledged")
+    assert bench.core.tick(bench.now) == bench.now + 50
+    bench.advance(40_000)
+    bench.take()
+    assert bench.core.tick(bench.now) == bench.now + 1_000
+    bench.advance(80_000)
+    assert bench.take() == []
+    client.acknowledges = False
+    assert client.ping()
+    bench.advance(bench.now + 1_500)
+    assert any(message[4] == 11 for message in bench.take()), "no HEARTBEAT once it is heard again"
 
 
 def test_a_line_that_flaps_keeps_no_timers() -> None:

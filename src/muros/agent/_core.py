@@ -59,6 +59,8 @@ _ATTEMPT_MEMORY = 10_000
 """How long a finished attempt is remembered, in ms."""
 _TICK = 50
 """How exactly heartbeats keep their time, in ms."""
+_DEAD_TICK = 1_000
+"""When to look again for clients that have fallen silent and are owed HEARTBEATs, in ms."""
 _LIVELINESS_TICK = 200
 _SUMMARY = 1_000
 """When to look whether findings are to be summarised, in ms after one."""
@@ -199,7 +201,7 @@ class AgentCore:
         self.now = now
         self._next = None
         self._calls.run(now)
-        self._heartbeats(now)
+        awaited = self._heartbeats(now)
         self._probe(now)
         self._forget_silent(now)
         self._ready(now)
@@ -207,8 +209,10 @@ class AgentCore:
             del self._attempts[oldest[0]]
         due = self._calls.next()
         waits = [] if due is None else [due]
-        if self.unacknowledged or self._fresh:
+        if awaited or self._fresh:
             waits.append(now + _TICK)
+        elif self.unacknowledged:
+            waits.append(now + _DEAD_TICK)
         if self._watched:
             waits.append(self._liveliness_at)
         if self.limits.forget_silent is not None and self.clients:
@@ -246,7 +250,9 @@ class AgentCore:
             self._fresh[session] = None
             self._wake(self.now + _TICK)
 
-    def _heartbeats(self, now: int) -> None:
+    def _heartbeats(self, now: int) -> bool:
+        """Whether any client that is there has something to acknowledge."""
+        awaited = False
         dead = self.limits.dead_time
         for session in list(self.unacknowledged):
             if now - session.heard > dead or session.lost_at is not None:
@@ -254,6 +260,9 @@ class AgentCore:
             session.heartbeats(now)
             if all(stream_id < 0x80 or stream.idle() for stream_id, stream in session.outputs.items()):
                 self.unacknowledged.pop(session, None)
+            else:
+                awaited = True
+        return awaited
 
     def _probe(self, now: int) -> None:
         if not self._watched or now < self._liveliness_at:

@@ -175,8 +175,8 @@ class Reading:
     """What a READ_DATA started: samples on their way from a source in the space to one stream of the client.
 
     ``take`` yields the body of the next DATA or None. It goes as fast as the stream takes and the read specification
-    (DDS-XRCE 1.0, 7.7.9) allows: a count, a time, bytes a second, a pace. A sample larger than a second's bytes goes
-    when the whole allowance is there.
+    (DDS-XRCE 1.0, 7.7.9) allows: a count, a time, bytes a second, a pace. A sample may take more than is left of a
+    second's bytes; what it took too much is made up for before the next one, so that a large sample goes too.
     """
 
     __slots__ = (
