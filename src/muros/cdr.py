@@ -8,7 +8,7 @@ with values of less than 31 bits nothing here allocates unless it says so.
 from array import array
 from struct import pack_into
 
-from muros.compat import MPY, as_bytes
+from muros.compat import MPY
 
 TYPE_CHECKING = 0
 if TYPE_CHECKING:
@@ -103,4 +103,4 @@ def block(values: "Sequence[Any]", code: str, n: int) -> "Any":
         values = array(code, values)
     if len(values) != n:
         raise CdrError("%d elements, %d needed" % (len(values), n))
-    return values if MPY else bytes(as_bytes(values))
+    return values if MPY else bytes(values)

@@ -14,17 +14,6 @@ if MPY:
     from time import sleep_ms, ticks_add, ticks_diff, ticks_ms, ticks_us  # type: ignore[attr-defined]
 
     from micropython import const  # type: ignore[import-not-found]
-    from uctypes import addressof, bytearray_at  # type: ignore[import-not-found]
-
-    def as_bytes(values):  # type: ignore[no-untyped-def]
-        """A byte view that aliases the storage of an array, without copying."""
-        return bytearray_at(addressof(values), len(values) * _item_size(values))
-
-    def _item_size(values):  # type: ignore[no-untyped-def]
-        text = repr(values)  # array('d', ...): boards have no itemsize attribute
-        if not text.startswith("array("):
-            return 1
-        return {"b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "l": 4, "L": 4, "f": 4}.get(text[7], 8)
 
     def copy(target, at, source, start, n):  # type: ignore[no-untyped-def]
         """Copies ``n`` bytes; a slice would allocate them on the heap first."""
@@ -65,10 +54,6 @@ else:
     def ticks_diff(later: int, earlier: int) -> int:
         """Milliseconds from ``earlier`` to ``later``, negative when ``later`` lies before."""
         return later - earlier
-
-    def as_bytes(values: object) -> memoryview:
-        """A byte view that aliases the storage of an array or buffer, without copying."""
-        return memoryview(values).cast("B")  # type: ignore[arg-type]
 
     def copy(
         target: bytearray, at: int, source: "bytes | bytearray | memoryview", start: int, n: int

@@ -1,8 +1,6 @@
 """muros.compat gives the same answers on every runtime."""
 
-from array import array
-
-from muros.compat import as_bytes, copy, ticks_add, ticks_diff, ticks_ms, ticks_us
+from muros.compat import copy, ticks_add, ticks_diff, ticks_ms, ticks_us
 from tests.board.harness import allocates
 
 
@@ -18,16 +16,6 @@ def test_ticks_add_and_diff_are_inverse() -> None:
     for delta in (0, 1, 1000, 0x1FFFFFF0):
         assert ticks_diff(ticks_add(now, delta), now) == delta
         assert ticks_diff(now, ticks_add(now, delta)) == -delta
-
-
-def test_as_bytes_aliases_an_array_of_every_type() -> None:
-    sizes = {"b": 1, "B": 1, "h": 2, "H": 2, "i": 4, "I": 4, "q": 8, "Q": 8, "f": 4, "d": 8}
-    for code, size in sizes.items():
-        values = array(code, [1, 2, 3])
-        view = as_bytes(values)
-        assert len(view) == 3 * size, code
-        view[0:size] = view[size : 2 * size]
-        assert values[0] == 2, code
 
 
 def test_copy_moves_exactly_n_bytes() -> None:
