@@ -1,6 +1,6 @@
 """The context: one way into the ROS graph, and the nodes on it."""
 
-from muros.compat import const
+from muros.compat import const, ticks_ms
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ class Context:
         self.domain_id = domain_id
         self.handles: "list[Handle]" = []  # what no executor has claimed, in the order of making
         self.running = True
+        self.clock: "Callable[[], int]" = ticks_ms  # what timers and executors go by
 
     def node(self, name: str, namespace: str = "") -> "Node":
         """A node. Raises InvalidNameError."""

@@ -5,7 +5,7 @@ executor lets the middleware work and waits for whatever comes first: a message,
 middleware.
 """
 
-from muros.compat import const, ticks_add, ticks_diff, ticks_ms
+from muros.compat import const, ticks_add, ticks_diff
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ class Executor:
 
     Without ``add`` it runs everything of the context that no other executor has claimed, in the order of making.
     ``handles`` bounds how many may be added (0: any number). ``trigger(handles)``, if given, decides before each pass
-    whether anything is taken. ``clock()`` gives ticks in ms.
+    whether anything is taken.
     """
 
     def __init__(
@@ -30,13 +30,11 @@ class Executor:
         context: "Context",
         handles: int = 0,
         trigger: "Callable[[list[Any]], bool] | None" = None,
-        clock: "Callable[[], int]" = ticks_ms,
     ) -> None:
         self.context = context
         self.capacity = handles
         self.trigger = trigger
         self.handles: "list[Any]" = context.handles
-        self._clock = clock
 
     def add(self, handle: "Any", callback: "Callable[..., object] | None" = None) -> None:
         """Runs a handle from now on, behind those added before; with ``callback`` in place of its own.
@@ -76,20 +74,20 @@ class Executor:
 
     def spin_period(self, period: float) -> None:
         """Makes one pass each ``period`` seconds until the context is closed; late ones are caught up."""
-        due = self._clock()
+        due = self.context.clock()
         while self.context.running:
             due = ticks_add(due, int(period * 1000))
-            self.work(self._clock())
-            left = ticks_diff(due, self._clock())
+            self.work(self.context.clock())
+            left = ticks_diff(due, self.context.clock())
             while left > 0:
                 self.context.middleware.wait(left)
-                self.context.middleware.spin_once(self._clock())
-                left = ticks_diff(due, self._clock())
+                self.context.middleware.spin_once(self.context.clock())
+                left = ticks_diff(due, self.context.clock())
 
     def round(self, timeout: int) -> bool:
         """``spin_some`` with ``timeout`` in ms; allocates nothing."""
         middleware = self.context.middleware
-        now = self._clock()
+        now = self.context.clock()
         end = ticks_add(now, timeout)
         while not self.work(now):
             left = ticks_diff(end, now)
@@ -99,7 +97,7 @@ class Executor:
             for handle in self.handles:
                 left = min(left, handle.left(now))
             middleware.wait(left)
-            now = self._clock()
+            now = self.context.clock()
         return True
 
     def work(self, now: int) -> bool:

@@ -1,6 +1,6 @@
 """Services: servers and clients."""
 
-from muros.compat import const, ticks_add, ticks_diff, ticks_ms
+from muros.compat import const, ticks_add, ticks_diff
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class Client:
         number = self.entity.send(request)
         if not number:
             return False
-        self._asked[number] = (on_reply, ticks_add(ticks_ms(), int(timeout * 1000)))
+        self._asked[number] = (on_reply, ticks_add(self.context.clock(), int(timeout * 1000)))
         return True
 
     def call(self, request: "Any", timeout: float = _TIMEOUT) -> "Any":
@@ -105,10 +105,10 @@ class Client:
         """
         answers: "list[Any]" = []
         middleware = self.context.middleware
-        end = ticks_add(ticks_ms(), int(timeout * 1000))
+        end = ticks_add(self.context.clock(), int(timeout * 1000))
         sent = False
         while not answers:
-            now = ticks_ms()
+            now = self.context.clock()
             left = ticks_diff(end, now)
             if left <= 0:
                 return None

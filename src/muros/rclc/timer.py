@@ -1,6 +1,6 @@
 """Timers, in whole milliseconds of the steady clock."""
 
-from muros.compat import const, ticks_add, ticks_diff, ticks_ms
+from muros.compat import const, ticks_add, ticks_diff
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ class Timer:
         self.cancelled = not autostart
         self.eager = True
         self.since = 0
-        self._last = ticks_ms()
+        self._last = context.clock()
         self._next = ticks_add(self._last, self.period)
         context.handles.append(self)
 
@@ -36,7 +36,7 @@ class Timer:
     def reset(self, now: "int | None" = None) -> None:
         """Starts a new period at the tick ``now``."""
         self.cancelled = False
-        self._next = ticks_add(ticks_ms() if now is None else now, self.period)
+        self._next = ticks_add(self.context.clock() if now is None else now, self.period)
 
     def exchange_period(self, period: float) -> float:
         """Sets the period in seconds, used from the next call on; returns the old one."""
