@@ -45,11 +45,12 @@ class Calls:
             self._stale = 0
 
     def run(self, now: int) -> None:
-        """Calls what is due at ``now``, in order of time; what these calls ask for at ``now`` waits for the next."""
-        due = []
-        while self._heap and self._heap[0][0] <= now:
-            due.append(heappop(self._heap)[2])
-        for call in due:
+        """Calls what is due at ``now``, in order of time. What these calls ask for at ``now`` may wait for the next."""
+        for _ in range(len(self._heap)):
+            heap = self._heap
+            if not heap or heap[0][0] > now:
+                return
+            call = heappop(heap)[2]
             function, call.function = call.function, None
             if function is None:
                 self._stale -= 1
