@@ -253,7 +253,7 @@ class Puppet:
         session = self.session
         writer = SimpleNamespace(
             session=session,
-            stream=Held(session.outputs[stream_id]),
+            stream=Held(session.output(stream_id & 0x80)),
             index=object_id >> 4,
             kind=object_id & 15,
             todo=0,

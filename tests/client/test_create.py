@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from muros.client import Qos
 from muros.client.hello import hello
-from muros.client.names import resolve, topic_name, type_name
+from muros.client.names import dds_type, resolve, topic_name
 from muros.client.qos import profile
 from muros.xrce import create, create_text
 from muros.xrce.representation import (
@@ -138,10 +138,10 @@ def test_names_of_ros() -> None:
         assert topic_name("rr", case["ros"], "Reply") == case["reply"]
     for case in NAMES["types"]:
         if "dds" in case:
-            assert type_name(case["ros"]) == case["dds"]
+            assert dds_type(case["ros"]) == case["dds"]
         elif "/srv/" in case["ros"]:
-            assert type_name(case["ros"], "_Request") == case["request"]
-            assert type_name(case["ros"], "_Response") == case["reply"]
+            assert dds_type(case["ros"], "_Request") == case["request"]
+            assert dds_type(case["ros"], "_Response") == case["reply"]
     for case in NAMES["rcl_expansion"]:
         assert resolve(case["input"], case["ns"], case["node"]) == case["out"]
 
@@ -152,9 +152,9 @@ def test_names_that_cannot_be() -> None:
     with pytest.raises(ValueError, match=r"too long: 60 characters .* at most 59"):
         topic_name("rt", "/" + "x" * longest)
     with pytest.raises(ValueError, match="too long"):
-        type_name("p/msg/" + "X" * 100)
+        dds_type("p/msg/" + "X" * 100)
     with pytest.raises(ValueError, match="should read like"):
-        type_name("String")
+        dds_type("String")
     with pytest.raises(ValueError, match="needs a name"):
         resolve("", "/", "n")
 

@@ -449,23 +449,18 @@ def test_close_without_an_agent_ends() -> None:
 
 def test_services_both_ways() -> None:
     world = World()
-    names = (
-        "/add",
-        "pkg::srv::dds_::Add_Request_",
-        "pkg::srv::dds_::Add_Response_",
-        "rq/addRequest",
-        "rr/addReply",
-    )
     server, client = world.client("server", client_key=1), world.client("client", client_key=2)
     replies: list[tuple[int, bytes]] = []
     replier = server.replier(
         server.participant("server"),
-        names,
+        "/add",
+        "pkg/srv/Add",
         lambda identity, buf, off, n: replier.reply(identity, Raw(b"re:" + bytes(buf[off : off + n]))),
     )
     requester = client.requester(
         client.participant("client"),
-        names,
+        "/add",
+        "pkg/srv/Add",
         lambda number, buf, off, n: replies.append((number, bytes(buf[off : off + n]))),
     )
     world.until(lambda: server.state == client.state == CONNECTED)

@@ -74,8 +74,9 @@ def test_names_on_the_wire_are_those_of_ros() -> None:
     board = Board(world)
     node = board.context.node("thermometer", namespace="greenhouse")
     writer: Any = node.publisher(Int32, "temperature")
-    assert (writer.name, writer.type_name) == ("rt/greenhouse/temperature", "std_msgs::msg::dds_::Int32_")
-    assert writer.participant.name == "/greenhouse/thermometer"
+    assert (writer.name, writer.type_name) == ("rt/greenhouse/temperature", "std_msgs/msg/Int32")
+    assert writer.node.name == "/greenhouse/thermometer"
+    assert b"std_msgs::msg::dds_::Int32_\0" in writer.variant(0)
     absolute: Any = node.publisher(Int32, "/temperature", qos="sensor_data")
     assert absolute.name == "rt/temperature"
     private: Any = node.publisher(Int32, "~/temperature", qos=Qos(depth=1))
@@ -182,7 +183,7 @@ def test_timers_keep_their_phase() -> None:  # X13
     world = World()
     board = Board(world)
     calls: list[int] = []
-    timer = board.node.timer(0.1, lambda: calls.append(world.now))
+    board.node.timer(0.1, lambda: calls.append(world.now))
     start = world.now
     executor = board.executor()
     board.spin(executor, 550)

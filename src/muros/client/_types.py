@@ -1,7 +1,7 @@
 """Types of the client's doors; imported by type checkers only."""
 
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, TypedDict
 
 from muros.xrce._types import Buffer
 
@@ -46,3 +46,20 @@ class Transport(Protocol):
 
     def wait(self, timeout: int) -> object:
         """Waits until something has come, at most ``timeout`` ms."""
+
+
+class Options(TypedDict, total=False):
+    """The settings of a ``Session``."""
+
+    creation: str
+    reference: str
+    properties: bool
+    hard_liveliness: int
+    queue: int
+    largest: int
+    heartbeat: int
+    retry: int
+    creation_timeout: int
+    keepalive: int
+    ping_timeout: int
+    ping_attempts: int

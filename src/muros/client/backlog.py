@@ -7,8 +7,8 @@ acknowledged (DDS-XRCE 1.0, 8.4.10 to 8.4.14).
 """
 
 from muros.client.link import CONNECTED
-from muros.client.session import head
 from muros.compat import const
+from muros.xrce.create import head
 from muros.xrce.fragments import Cutter
 
 TYPE_CHECKING = const(0)

@@ -1,8 +1,8 @@
 """The ends: entities are destroyed, sessions take leave of their agent."""
 
 from muros.client.link import WAITING
-from muros.client.session import head
 from muros.compat import const
+from muros.xrce.create import head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:

@@ -6,16 +6,17 @@ yet, of ``asked`` that its request is under way; ``steps`` itself stands for the
 """
 
 from muros.client.link import CONNECTED
+from muros.client.names import dds_type
 from muros.client.qos import profile
-from muros.client.session import head
 from muros.compat import const
+from muros.xrce.create import head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
 
     from muros.client._types import Message
-    from muros.client.qos import Qos
+    from muros.client.qos import AnyQos
     from muros.client.session import Session
 
 _WRITE_DATA = const(7)
@@ -56,6 +57,7 @@ class Entity:
 
     steps = 1
     reads = 0  # 1 for entities that ask for data
+    status = 0
 
     def __init__(self, session: "Session", name: str) -> None:
         self.session = session
@@ -63,12 +65,13 @@ class Entity:
         self.request = 0  # the id of the first request, one more for each step
         self.todo = 0
         self.asked = 0
-        self.status = 0
         session.add(self)
 
     def renew(self) -> None:
         """Everything is to be created again."""
-        self.request = self.asked = self.status = 0
+        self.request = self.asked = 0
+        if self.status:
+            self.status = 0
         self.todo = (1 << self.steps + self.reads) - 1
 
     def object_id(self, step: int) -> int:
@@ -115,9 +118,10 @@ class Endpoint(Entity):
     kind = _KIND_DATAWRITER
 
     def __init__(
-        self, session: "Session", participant: Participant, name: str, type_name: str, qos: "str | Qos"
+        self, session: "Session", node: Participant, name: str, type_name: str, qos: "AnyQos"
     ) -> None:
-        self.participant = participant
+        self.node = node
+        dds_type(type_name)  # complains now about what cannot be
         self.type_name = type_name
         self.qos = profile(qos)
         self.topic_index = session.index(_KIND_TOPIC)
@@ -134,12 +138,12 @@ class Endpoint(Entity):
         """Their representations."""
         create = self.session.create
         if step == 0:
-            made: bytes = create.topic(self.name, self.type_name, self.participant.object_id(0))
+            made: bytes = create.topic(self.name, dds_type(self.type_name), self.node.object_id(0))
         elif step == 1:
-            made = create.group(self.kind - 2, self.participant.object_id(0))
+            made = create.group(self.kind - 2, self.node.object_id(0))
         else:
             made = create.endpoint(
-                self.kind, self.object_id(0), self.qos, self.object_id(1), self.name, self.type_name
+                self.kind, self.object_id(0), self.qos, self.object_id(1), self.name, dds_type(self.type_name)
             )
         return made
 
@@ -148,10 +152,10 @@ class Writer(Endpoint):
     """Writes samples; reliable or best effort by its QoS."""
 
     def __init__(
-        self, session: "Session", participant: Participant, name: str, type_name: str, qos: "str | Qos"
+        self, session: "Session", node: Participant, name: str, type_name: str, qos: "AnyQos"
     ) -> None:
-        super().__init__(session, participant, name, type_name, qos)
-        self.stream = session.reliable if self.qos.flags & _QOS_RELIABLE else session.best
+        super().__init__(session, node, name, type_name, qos)
+        self.stream = session.output(self.qos.flags & _QOS_RELIABLE)
 
     publish = publish
 

@@ -60,53 +60,40 @@ _PROBLEM_OUT_OF_STEP = const(2)
 
 
 class Link(SessionCore):
-    """The connection of a session; ``Session`` adds what is created over it."""
+    """The connection of a session; ``Session`` adds what is created over it, and says what the settings mean."""
+
+    properties = True
+    hard_liveliness = 0
+    retry = 1000
+    keepalive = 1000
+    ping_timeout = 300
+    ping_attempts = 3
+    on_state: "Callable[[int], object] | None" = None
+    on_problem: "Callable[[int, str], object] | None" = None
+    on_time: "Callable[[Buffer, int], object] | None" = None
 
     def __init__(
-        self,
-        transport: "Transport",
-        client_key: "int | bytes | None",
-        session_id: int,
-        mtu: int,
-        largest: int,
-        properties: bool,
-        hard_liveliness: int,
-        retry: int,
-        keepalive: int,
-        ping_timeout: int,
-        ping_attempts: int,
+        self, transport: "Transport", client_key: "int | bytes | None", session_id: int, mtu: int
     ) -> None:
         if client_key is None:
-            client_key = urandom(4)
-            if client_key == b"\0\0\0\0":
-                client_key = b"\0\0\0\1"
+            client_key = urandom(3) + bytes((urandom(1)[0] | 1,))
         elif isinstance(client_key, int):
             client_key = bytes([client_key >> shift & 255 for shift in (24, 16, 8, 0)])
         if len(client_key) != 4 or client_key == b"\0\0\0\0":
             raise ValueError("client_key must be 4 bytes or an integer from 1 to 0xFFFFFFFF")
-        super().__init__(session_id, client_key, self._send, self._on, largest)
+        super().__init__(session_id, client_key, self._send, self._on, 0)
         self.transport = transport
         self.key = client_key
         self.mtu = mtu
-        self.properties = properties
-        self.hard_liveliness = hard_liveliness
-        self.retry = retry
-        self.keepalive = keepalive
-        self.ping_timeout = ping_timeout
-        self.ping_attempts = ping_attempts
         self.state = WAITING
-        self.on_state: "Callable[[int], object] | None" = None
-        self.on_problem: "Callable[[int, str], object] | None" = None
-        self.on_time: "Callable[[Buffer, int], object] | None" = None
-        self.request = _FIRST_REQUEST
+        self.request = _FIRST_REQUEST  # the next request id
         self.login = True  # the agent has yet to accept us
-        self._attempt = b""
         self.up = False  # the transport is open
-        self._now_due = True  # what is next needs no waiting for _due
-        self._due = 0
+        self._attempt = b""
+        self._due: "int | None" = None  # the tick of the next attempt; None: at once
         self._heard = 0
         self._tries = 0
-        self._ping = 0
+        self._ping = 0  # the request id of the question that is open
         self._suspect = False
 
     def spin_once(self, now: "int | None" = None) -> int:
@@ -136,7 +123,7 @@ class Link(SessionCore):
     def next(self, now: int) -> int:
         """Milliseconds from ``now`` until the connection has something to do."""
         if self.login or self.state == LOST or self._ping:
-            return 0 if self._now_due else ticks_diff(self._due, now)
+            return 0 if self._due is None else ticks_diff(self._due, now)
         return self.keepalive - ticks_diff(now, self._heard) if self.keepalive else _SLOWLY
 
     def requests(self, count: int) -> int:
@@ -164,7 +151,7 @@ class Link(SessionCore):
         """Takes an event through the table."""
         new = _NEXT[self.state * _EVENTS + event]
         self._ping = self._tries = 0
-        self._now_due = True
+        self._due = None
         if event == _UNKNOWN or new == WAITING:
             self.login = True
         self.enter(new)
@@ -230,9 +217,8 @@ class Link(SessionCore):
 
     def _is_due(self, now: int, again: int) -> bool:
         """Whether the next attempt is due and the transport open; if so, the one after comes in ``again`` ms."""
-        if not self._now_due and ticks_diff(now, self._due) < 0:
+        if self._due is not None and ticks_diff(now, self._due) < 0:
             return False
-        self._now_due = False
         self._due = ticks_add(now, again)
         if not self.up:
             try:
@@ -261,13 +247,13 @@ class Link(SessionCore):
             self.happened(_UNKNOWN)
         elif self.keepalive and ticks_diff(now, self._heard) >= self.keepalive:
             if self._ping == 0:
-                self._now_due = True
-            if self._tries < self.ping_attempts:
-                if self._is_due(now, self.ping_timeout):
-                    self._tries += 1
+                self._due = None
+            if self._is_due(now, self.ping_timeout):
+                self._tries += 1
+                if self._tries > self.ping_attempts:
+                    self.happened(_SILENT)
+                else:
                     self._ask()
-            elif ticks_diff(now, self._due) >= 0:
-                self.happened(_SILENT)
         elif self._ping:
             self._ping = self._tries = 0
 

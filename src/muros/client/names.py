@@ -33,11 +33,13 @@ def topic_name(prefix: str, name: str, suffix: str = "", limit: int = _NAME) -> 
     return made
 
 
-def type_name(ros: str, suffix: str = "", limit: int = _TYPE) -> str:
-    """The type in DDS: ``std_msgs/msg/String`` becomes ``std_msgs::msg::dds_::String_``.
+def dds_type(ros: str, suffix: str = "", limit: int = _TYPE) -> str:
+    """The type in DDS: ``std_msgs/msg/String`` becomes ``std_msgs::msg::dds_::String_``; others stay as they are.
 
     Raises ValueError when it is not a type's name or longer than ``limit`` characters.
     """
+    if "::" in ros:
+        return ros
     parts = ros.split("/")
     if len(parts) != 3:
         raise ValueError("%r is no type: it should read like std_msgs/msg/String" % ros)

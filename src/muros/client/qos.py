@@ -2,6 +2,12 @@
 
 from muros.compat import const
 
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+    AnyQos: TypeAlias = "str | Qos"
+
 _RELIABLE = const(0x01)
 _KEEP_LAST = const(0x02)
 _DURABILITIES = ("volatile", "transient_local", "transient", "persistent")

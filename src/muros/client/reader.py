@@ -8,7 +8,7 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.client._types import OnData
     from muros.client.entities import Participant
-    from muros.client.qos import Qos
+    from muros.client.qos import AnyQos
     from muros.client.session import Session
     from muros.xrce._types import Buffer
 
@@ -25,19 +25,19 @@ class Reader(Endpoint):
 
     kind = _KIND_DATAREADER
     reads = 1
+    limits: "tuple[int, int, int, int] | None" = None
 
     def __init__(
         self,
         session: "Session",
-        participant: "Participant",
+        node: "Participant",
         name: str,
         type_name: str,
-        qos: "str | Qos",
+        qos: "AnyQos",
         on_data: "OnData | None",
     ) -> None:
         self.on_data = on_data
-        self.limits: "tuple[int, int, int, int] | None" = None
-        super().__init__(session, participant, name, type_name, qos)
+        super().__init__(session, node, name, type_name, qos)
         session.objects[self.object_id(2)] = self
 
     def read(

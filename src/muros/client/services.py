@@ -6,6 +6,7 @@ has to begin with the same.
 """
 
 from muros.client.entities import Entity, publish
+from muros.client.names import dds_type, topic_name
 from muros.client.qos import profile
 from muros.compat import const, copy
 from muros.xrce.create import read_data
@@ -16,11 +17,10 @@ if TYPE_CHECKING:
 
     from muros.client._types import Message
     from muros.client.entities import Participant
-    from muros.client.qos import Qos
+    from muros.client.qos import AnyQos
     from muros.client.session import Session
     from muros.xrce._types import Buffer
 
-    Names = tuple[str, str, str, str, str]
     OnReply = Callable[[int, Buffer, int, int], object]
     OnRequest = Callable[[bytes, Buffer, int, int], object]
 
@@ -34,20 +34,21 @@ _IDENTITY = const(24)
 
 
 class _Service(Entity):
-    """What both sides share. ``names``: service, type of requests, of replies, topic of requests, of replies."""
+    """What both sides share. The names of topics and types in DDS are those that ROS gives them."""
 
     kind = 0
     reads = 1
 
-    def __init__(
-        self, session: "Session", participant: "Participant", names: "Names", qos: "str | Qos"
-    ) -> None:
-        self.participant = participant
-        self.names = names
-        self.stream = session.reliable if profile(qos).flags & _QOS_RELIABLE else session.best
+    def __init__(self, session: "Session", node: "Participant", name: str, kind: str, qos: "AnyQos") -> None:
+        self.node = node
+        self.type_name = kind
+        self.name = name
+        self.stream = session.output(profile(qos).flags & _QOS_RELIABLE)
+        self.session = session
         self.index = session.index(self.kind)
         session.objects[self.object_id(0)] = self
-        super().__init__(session, names[0])
+        self.variant(0)  # complains now about what cannot be
+        super().__init__(session, name)
 
     def object_id(self, step: int) -> int:
         """The id of the requester or replier."""
@@ -55,15 +56,15 @@ class _Service(Entity):
 
     def variant(self, step: int) -> bytes:
         """Its representation."""
-        name, request_type, reply_type, request_topic, reply_topic = self.names
+        name = self.name
         made: bytes = self.session.create.service(
             self.kind,
             name,
-            request_type,
-            reply_type,
-            request_topic,
-            reply_topic,
-            self.participant.object_id(0),
+            dds_type(self.type_name, "_Request"),
+            dds_type(self.type_name, "_Response"),
+            topic_name("rq", name, "Request"),
+            topic_name("rr", name, "Reply"),
+            self.node.object_id(0),
         )
         return made
 
@@ -83,13 +84,14 @@ class Requester(_Service):
     def __init__(
         self,
         session: "Session",
-        participant: "Participant",
-        names: "Names",
-        on_reply: "OnReply | None",
-        qos: "str | Qos",
+        node: "Participant",
+        name: str,
+        kind: str,
+        on_reply: "OnReply",
+        qos: "AnyQos",
     ) -> None:
         self.on_reply = on_reply
-        super().__init__(session, participant, names, qos)
+        super().__init__(session, node, name, kind, qos)
 
     def send(self, request: "Message") -> int:
         """Sends a request; its number, or 0 when it was not taken."""
@@ -97,7 +99,7 @@ class Requester(_Service):
 
     def deliver(self, buf: "Buffer", off: int, n: int) -> None:
         """Takes a reply."""
-        if n >= 4 and self.on_reply is not None:
+        if n >= 4:
             self.on_reply(buf[off] << 8 | buf[off + 1], buf, off + 4, n - 4)
 
 
@@ -109,13 +111,14 @@ class Replier(_Service):
     def __init__(
         self,
         session: "Session",
-        participant: "Participant",
-        names: "Names",
-        on_request: "OnRequest | None",
-        qos: "str | Qos",
+        node: "Participant",
+        name: str,
+        kind: str,
+        on_request: "OnRequest",
+        qos: "AnyQos",
     ) -> None:
         self.on_request = on_request
-        super().__init__(session, participant, names, qos)
+        super().__init__(session, node, name, kind, qos)
 
     def reply(self, identity: bytes, reply: "Message") -> bool:
         """Answers the request of that identity; False when it was not taken."""
@@ -123,7 +126,7 @@ class Replier(_Service):
 
     def deliver(self, buf: "Buffer", off: int, n: int) -> None:
         """Takes a request."""
-        if n >= _IDENTITY and self.on_request is not None:
+        if n >= _IDENTITY:
             identity = bytes(memoryview(buf)[off : off + _IDENTITY])
             self.on_request(identity, buf, off + _IDENTITY, n - _IDENTITY)
 

@@ -11,6 +11,7 @@ from array import array
 from muros.client.link import CONNECTED, CONNECTING, LOST, WAITING, Link
 from muros.compat import MPY, const, sleep_ms, ticks_add, ticks_diff
 from muros.xrce import create
+from muros.xrce.create import head
 from muros.xrce.inputs import BestEffortInput, ReliableInput
 from muros.xrce.outputs import BestEffortOutput, ReliableOutput
 
@@ -18,14 +19,14 @@ __all__ = ["CONNECTED", "CONNECTING", "LOST", "WAITING", "Session"]
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
-    from typing import Any
+    from typing import Any, Unpack
 
-    from muros.client._types import Message, OnData, Transport
+    from muros.client._types import Message, OnData, Options, Transport
     from muros.client.backlog import Backlog
     from muros.client.entities import Entity, Participant, Writer
-    from muros.client.qos import Qos
+    from muros.client.qos import AnyQos
     from muros.client.reader import Reader
-    from muros.client.services import Names, OnReply, OnRequest, Replier, Requester
+    from muros.client.services import OnReply, OnRequest, Replier, Requester
     from muros.xrce._types import Buffer
 
 _CREATE = const(1)
@@ -67,6 +68,14 @@ class Session(Link):
     larger than a message, because they were for no reader of ours.
     """
 
+    creation = "binary"
+    reference = "participant_profile"
+    queue = 0
+    largest = 0
+    heartbeat = 100
+    creation_timeout = 1000
+    backlog: "Backlog | None" = None
+
     def __init__(
         self,
         transport: "Transport",
@@ -74,54 +83,32 @@ class Session(Link):
         session_id: int = 0x81,
         mtu: int = 0,
         history: int = 4,
-        *,
-        creation: str = "binary",
-        properties: bool = True,
-        hard_liveliness: int = 0,
-        queue: int = 0,
-        largest: int = 0,
-        heartbeat: int = 100,
-        retry: int = 1000,
-        creation_timeout: int = 1000,
-        keepalive: int = 1000,
-        ping_timeout: int = 300,
-        ping_attempts: int = 3,
-        reference: str = "participant_profile",
+        **options: "Unpack[Options]",
     ) -> None:
         mtu = (mtu or transport.mtu) - 4
-        super().__init__(
-            transport,
-            client_key,
-            session_id,
-            mtu,
-            largest or mtu * history * (1 if MPY else 64),
-            properties,
-            hard_liveliness,
-            retry,
-            keepalive,
-            ping_timeout,
-            ping_attempts,
-        )
-        self.best = BestEffortOutput(_STREAM_BEST_EFFORT, mtu, self.head)
-        self.reliable = ReliableOutput(_STREAM_RELIABLE, mtu, self.head, history, heartbeat)
-        self.outputs[_STREAM_BEST_EFFORT] = self.best
+        super().__init__(transport, client_key, session_id, mtu)
+        for name in options:
+            if not hasattr(Session, name):
+                raise TypeError("Session has no option " + name)
+            setattr(self, name, options[name])  # type: ignore[literal-required]
+        if self.largest == 0:
+            self.largest = mtu * history * (1 if MPY else 64)
+        self.reliable = ReliableOutput(_STREAM_RELIABLE, mtu, self.head, history, self.heartbeat)
         self.outputs[_STREAM_RELIABLE] = self.reliable
-        self.inputs[_STREAM_BEST_EFFORT] = BestEffortInput(_STREAM_BEST_EFFORT)
         self.inputs[_STREAM_RELIABLE] = ReliableInput(_STREAM_RELIABLE, mtu, history)
         self.create: "Any" = create
-        if creation != "binary":
+        if self.creation != "binary":
             from muros.xrce import create_text
 
-            self.create = create_text.Xml() if creation == "xml" else create_text.Reference(reference)
-        self.queue = queue
-        self.creation_timeout = creation_timeout
+            self.create = (
+                create_text.Xml() if self.creation == "xml" else create_text.Reference(self.reference)
+            )
         self.drops = array("I", (0, 0, 0, 0))
         self.entities: "list[Entity]" = []
         self.objects: "dict[int, Any]" = {}  # what takes DATA, by object id
-        self.backlog: "Backlog | None" = None
         self.pending = 0  # entities that are not whole yet
-        self._counts = bytearray(9)  # the next index for each kind of object
         self.waiting = 0  # requests without a STATUS
+        self._counts = bytearray(9)  # the next index for each kind of object
         self._late = 0  # the tick when those are made again
         self._laps = 0  # how often that happened since the last STATUS
 
@@ -131,50 +118,40 @@ class Session(Link):
 
         return Participant(self, name[:59], domain)
 
-    def writer(
-        self, participant: "Participant", topic: str, type_name: str, qos: "str | Qos" = "default"
-    ) -> "Writer":
-        """A writer of ``topic``, both names as DDS has them. ``writer.publish(message)`` sends."""
+    def writer(self, node: "Participant", topic: str, kind: str, qos: "AnyQos" = "default") -> "Writer":
+        """A writer of ``topic`` with messages of a type, named as in ROS or in DDS. ``publish(message)`` sends."""
         from muros.client.entities import Writer
 
-        return Writer(self, participant, topic, type_name, qos)
+        return Writer(self, node, topic, kind, qos)
 
     def reader(
         self,
-        participant: "Participant",
+        node: "Participant",
         topic: str,
-        type_name: str,
-        qos: "str | Qos" = "default",
+        kind: str,
+        qos: "AnyQos" = "default",
         on_data: "OnData | None" = None,
     ) -> "Reader":
         """A reader of ``topic``; ``on_data(buf, off, n)`` gets each sample, whose bytes are only lent."""
         from muros.client.reader import Reader
 
-        return Reader(self, participant, topic, type_name, qos, on_data)
+        return Reader(self, node, topic, kind, qos, on_data)
 
     def requester(
-        self,
-        participant: "Participant",
-        names: "Names",
-        on_reply: "OnReply | None" = None,
-        qos: "str | Qos" = "services",
+        self, node: "Participant", name: str, kind: str, on_reply: "OnReply", qos: "AnyQos" = "services"
     ) -> "Requester":
-        """A client of a service; ``on_reply(number, buf, off, n)`` gets replies, see ``services``."""
+        """A client of the service ``name``; ``on_reply(number, buf, off, n)`` gets replies, see ``services``."""
         from muros.client.services import Requester
 
-        return Requester(self, participant, names, on_reply, qos)
+        return Requester(self, node, name, kind, on_reply, qos)
 
     def replier(
-        self,
-        participant: "Participant",
-        names: "Names",
-        on_request: "OnRequest | None" = None,
-        qos: "str | Qos" = "services",
+        self, node: "Participant", name: str, kind: str, on_request: "OnRequest", qos: "AnyQos" = "services"
     ) -> "Replier":
-        """A server of a service; ``on_request(identity, buf, off, n)`` gets requests, see ``services``."""
+        """A server of the service ``name``; ``on_request(identity, buf, off, n)`` gets requests, see ``services``."""
         from muros.client.services import Replier
 
-        return Replier(self, participant, names, on_request, qos)
+        return Replier(self, node, name, kind, on_request, qos)
 
     def wait(self, timeout: int) -> None:
         """Waits until something may have come, at most ``timeout`` ms."""
@@ -199,6 +176,22 @@ class Session(Link):
         close(self)
 
     # For entities
+
+    def output(self, reliable: int) -> "BestEffortOutput":
+        """The stream to write to; the one for best effort is made at the first need."""
+        if reliable:
+            return self.reliable
+        if _STREAM_BEST_EFFORT not in self.outputs:
+            self.outputs[_STREAM_BEST_EFFORT] = BestEffortOutput(_STREAM_BEST_EFFORT, self.mtu, self.head)
+        made: "BestEffortOutput" = self.outputs[_STREAM_BEST_EFFORT]
+        return made
+
+    def make_input(self, stream_id: int) -> "BestEffortInput | None":
+        """The stream for best effort is made when something comes on it; there are no others."""
+        if stream_id != _STREAM_BEST_EFFORT:
+            return None
+        made = self.inputs[stream_id] = BestEffortInput(stream_id)
+        return made
 
     def index(self, kind: int) -> int:
         """A new index for an object of a kind; each is used once."""
@@ -340,18 +333,3 @@ class Session(Link):
                     if entity.todo == 0:
                         self.pending -= 1
             return
-
-
-def head(buf: bytearray, at: int, kind: int, flags: int, n: int, request: int, object_id: int) -> None:
-    """Writes the header of a submessage with ``n`` bytes of payload, and the ids that its payload begins with.
-
-    A payload of 64 KiB or more has length 0: it runs to the end of the message.
-    """
-    buf[at] = kind
-    buf[at + 1] = flags
-    buf[at + 2] = n & 255 if n < 0x10000 else 0
-    buf[at + 3] = n >> 8 if n < 0x10000 else 0
-    buf[at + 4] = request >> 8
-    buf[at + 5] = request & 255
-    buf[at + 6] = object_id >> 8
-    buf[at + 7] = object_id & 255

@@ -5,7 +5,7 @@ from typing import Any, Protocol
 
 from muros.client._types import Message
 from muros.client.qos import Qos
-from muros.client.services import Names, OnReply, OnRequest
+from muros.client.services import OnReply, OnRequest
 from muros.xrce._types import Buffer
 
 
@@ -38,7 +38,10 @@ class Replier(Entity, Protocol):
 
 
 class Middleware(Protocol):
-    """What carries rclc: a session with an agent, or a data space. Names are those of DDS."""
+    """What carries rclc: a session with an agent, or a data space.
+
+    Topics are named as in DDS, services and types as in ROS.
+    """
 
     state: int
     on_state: Callable[[int], object] | None
@@ -63,15 +66,22 @@ class Middleware(Protocol):
         """A reader."""
 
     def requester(
-        self, participant: Any, names: Names, on_reply: OnReply | None = None, qos: str | Qos = "services", /
+        self,
+        participant: Any,
+        name: str,
+        type_name: str,
+        on_reply: OnReply,
+        qos: str | Qos = "services",
+        /,
     ) -> Requester:
         """A client of a service."""
 
     def replier(
         self,
         participant: Any,
-        names: Names,
-        on_request: OnRequest | None = None,
+        name: str,
+        type_name: str,
+        on_request: OnRequest,
         qos: str | Qos = "services",
         /,
     ) -> Replier:

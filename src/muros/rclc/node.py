@@ -1,6 +1,6 @@
 """Nodes, and what is made on them."""
 
-from muros.client.names import resolve, topic_name, type_name
+from muros.client.names import resolve, topic_name
 from muros.compat import const
 
 TYPE_CHECKING = const(0)
@@ -38,7 +38,7 @@ class Node:
 
     def publisher(self, kind: "Any", topic: str, qos: "str | Qos" = "default") -> "Publisher":
         """A publisher: ``publish(message)`` returns whether the message was taken."""
-        made = self.context.middleware.writer(self.participant, self._topic(topic), type_name(kind.TYPE), qos)
+        made = self.context.middleware.writer(self.participant, self._topic(topic), kind.TYPE, qos)
         self.entities.append(made)
         return made
 
@@ -57,7 +57,7 @@ class Node:
 
         made = Subscription(self.context, kind, callback, qos)
         made.entity = self.context.middleware.reader(
-            self.participant, self._topic(topic), type_name(kind.TYPE), qos, made.deliver
+            self.participant, self._topic(topic), kind.TYPE, qos, made.deliver
         )
         self.entities.append(made)
         return made
@@ -78,7 +78,7 @@ class Node:
 
         made = Service(self.context, kind, callback)
         made.entity = self.context.middleware.replier(
-            self.participant, self._service(kind, name), made.deliver, qos
+            self.participant, self._resolve(name), kind.TYPE, made.deliver, qos
         )
         self.entities.append(made)
         return made
@@ -89,7 +89,7 @@ class Node:
 
         made = Client(self.context, kind)
         made.entity = self.context.middleware.requester(
-            self.participant, self._service(kind, name), made.deliver, qos
+            self.participant, self._resolve(name), kind.TYPE, made.deliver, qos
         )
         self.entities.append(made)
         return made
@@ -102,26 +102,19 @@ class Node:
         self.participant.destroy()
 
     def _topic(self, name: str) -> str:
-        return topic_name("rt", resolve(name, self.namespace, self.name))
+        return topic_name("rt", self._resolve(name))
 
-    def _service(self, kind: "Any", name: str) -> "tuple[str, str, str, str, str]":
-        name = resolve(name, self.namespace, self.name)
-        return (
-            name,
-            type_name(kind.TYPE, "_Request"),
-            type_name(kind.TYPE, "_Response"),
-            topic_name("rq", name, "Request"),
-            topic_name("rr", name, "Reply"),
-        )
+    def _resolve(self, name: str) -> str:
+        return resolve(name, self.namespace, self.name)
 
 
 def _check(name: str) -> None:
     """Raises InvalidNameError unless ``name`` and each part of it is made as ROS asks."""
     for part in name.split("/"):
-        good = part != "" and not "0" <= part[0] <= "9"
-        for letter in part:
-            good = good and (letter == "_" or "0" <= letter <= "9" or "a" <= letter.lower() <= "z")
-        if not good:
+        plain = part.replace("_", "a")
+        for digit in "0123456789":
+            plain = plain.replace(digit, "a")
+        if not plain.isalpha() or part[0] in "0123456789" or len(part) != len(part.encode()):
             from muros.rclc.errors import InvalidNameError
 
             raise InvalidNameError(

@@ -21,13 +21,14 @@ class Service:
     ``malformed`` counts samples that are no request of this type.
     """
 
+    eager = True
+    identity = b""
+    malformed = 0
+
     def __init__(self, context: "Context", kind: "Any", callback: "Callable[[Any], Any]") -> None:
         self.context = context
         self.callback = callback
         self.entity: "Any" = None
-        self.eager = True
-        self.identity = b""
-        self.malformed = 0
         self._kind = kind
         self._waiting: "list[tuple[bytes, Any]]" = []
         self._answers: "list[tuple[bytes, Any]]" = []  # those for which the window had no room
@@ -77,11 +78,12 @@ class Service:
 class Client:
     """Made by ``Node.client``. ``malformed`` counts replies that are no response of this type."""
 
+    eager = True
+    malformed = 0
+
     def __init__(self, context: "Context", kind: "Any") -> None:
         self.context = context
         self.entity: "Any" = None
-        self.eager = True
-        self.malformed = 0
         self._kind = kind
         self._asked: "dict[int, tuple[Any, int]]" = {}  # number: (on_reply, deadline)
         self._waiting: "list[tuple[Any, Any]]" = []

@@ -24,16 +24,17 @@ class Subscription:
     message of this type.
     """
 
+    eager = True
+    lost = 0
+    malformed = 0
+
     def __init__(
         self, context: "Context", kind: "Any", callback: "Callable[[Any], object] | None", qos: "str | Qos"
     ) -> None:
         self.context = context
         self.callback = callback
         self.entity: "Entity | None" = None
-        self.eager = True
         self.depth = 1 if MPY else profile(qos).depth or 1000
-        self.lost = 0
-        self.malformed = 0
         self._kind = kind
         self._waiting: "list[Any]" = []
         self._message = kind()

@@ -16,6 +16,9 @@ class Timer:
     missed are skipped. A period of 0 is always ready. ``since`` is the time from the last call to this one, in ms.
     """
 
+    eager = True
+    since = 0
+
     def __init__(
         self, context: "Context", period: float, callback: "Callable[[], object]", autostart: bool
     ) -> None:
@@ -23,8 +26,6 @@ class Timer:
         self.callback = callback
         self.period = int(period * 1000 + 0.5)
         self.cancelled = not autostart
-        self.eager = True
-        self.since = 0
         self._last = context.clock()
         self._next = ticks_add(self._last, self.period)
         context.handles.append(self)
