@@ -83,6 +83,7 @@ class Link(SessionCore):
             raise ValueError("client_key must be 4 bytes or an integer from 1 to 0xFFFFFFFF")
         super().__init__(session_id, client_key, self._send, self._on, 0)
         self.transport = transport
+        self._deliver = self.deliver  # taking a method from its object costs a board memory each time
         self.key = client_key
         self.mtu = mtu
         self.state = WAITING
@@ -104,7 +105,7 @@ class Link(SessionCore):
         taken = 0
         if self.up:
             try:
-                taken = self.transport.receive(self.deliver)
+                taken = self.transport.receive(self._deliver)
             except OSError:
                 self.up = False
         if not self.up and not self.login and self.state != LOST:

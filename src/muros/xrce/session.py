@@ -101,8 +101,8 @@ class SessionCore:
 
     def flush(self, now: int) -> None:
         """Sends everything that was built and not sent."""
-        for stream in self.outputs.values():
-            stream.flush(self.send, now)
+        for stream_id in self.outputs:
+            self.outputs[stream_id].flush(self.send, now)
 
     def heartbeats(self, now: int) -> None:
         """Sends the HEARTBEATs that are due."""
