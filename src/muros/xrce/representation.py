@@ -183,8 +183,8 @@ class DataReaderEntity:
 
 
 @dataclass(frozen=True, slots=True)
-class RequesterEntity:
-    """The calling side of a service. Topic names that are not given follow from the service's name."""
+class ServiceEntity:
+    """One side of a service. Topic names that are not given follow from the service's name."""
 
     service_name: str
     request_type: str
@@ -194,34 +194,23 @@ class RequesterEntity:
 
     @property
     def request_topic_name(self) -> str:
-        """The topic requests go on: as given, else `<service>_Request`."""
+        """The topic of requests: as given, else `<service>_Request`."""
         return self.request_topic or self.service_name + "_Request"
 
     @property
     def reply_topic_name(self) -> str:
-        """The topic replies come on: as given, else `<service>_Reply`."""
+        """The topic of replies: as given, else `<service>_Reply`."""
         return self.reply_topic or self.service_name + "_Reply"
 
 
 @dataclass(frozen=True, slots=True)
-class ReplierEntity:
-    """The answering side of a service. Topic names that are not given follow from the service's name."""
+class RequesterEntity(ServiceEntity):
+    """The calling side of a service."""
 
-    service_name: str
-    request_type: str
-    reply_type: str
-    request_topic: str | None = None
-    reply_topic: str | None = None
 
-    @property
-    def request_topic_name(self) -> str:
-        """The topic requests come on: as given, else `<service>_Request`."""
-        return self.request_topic or self.service_name + "_Request"
-
-    @property
-    def reply_topic_name(self) -> str:
-        """The topic replies go on: as given, else `<service>_Reply`."""
-        return self.reply_topic or self.service_name + "_Reply"
+@dataclass(frozen=True, slots=True)
+class ReplierEntity(ServiceEntity):
+    """The answering side of a service."""
 
 
 Entity: TypeAlias = (
