@@ -16,9 +16,12 @@ if MPY:
     from micropython import const  # type: ignore[import-not-found]
 
     def copy(target, at, source, start, n):  # type: ignore[no-untyped-def]
-        """Copies ``n`` bytes; a slice would allocate them on the heap first."""
-        for i in range(n):
-            target[at + i] = source[start + i]
+        """Copies ``n`` bytes; a part of the source would be allocated on the heap first."""
+        if start == 0 and n == len(source):
+            target[at : at + n] = source
+        else:
+            for i in range(n):
+                target[at + i] = source[start + i]
 
     try:
         from os import urandom

@@ -235,6 +235,7 @@ def test_receiving_over_a_serial_line_allocates_nothing() -> None:
 
     custom = Custom(lambda: True, lambda: None, nowhere, read, True, 256)
     board.session.transport = custom
+    board.session.send = custom.send
     deliver = board.session.deliver
 
     def receive() -> None:

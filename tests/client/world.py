@@ -58,8 +58,9 @@ class SimulatedTransport:
         self.open()
 
     def send(self, buf: Buffer, off: int, n: int) -> None:
-        """Sends a message to the agent."""
-        self._fail()
+        """Sends a message to the agent; a fault loses it and shows in the next receive."""
+        if self.fault is not None:
+            return
         assert n <= self.mtu - 4, f"a message of {n} B is longer than what was announced"
         assert self._endpoint is not None
         message = bytes(memoryview(buf)[off : off + n])

@@ -36,7 +36,7 @@ class Transport(Protocol):
         """Closes the way; ``open`` may be called again."""
 
     def send(self, buf: Buffer, off: int, n: int) -> object:
-        """Sends a message; OSError when the way is gone."""
+        """Sends a message. Never raises: when the way is gone, the next ``receive`` does."""
 
     def receive(self, deliver: Deliver) -> int:
         """Calls ``deliver`` for each message that has come, up to a bound, and returns their number.

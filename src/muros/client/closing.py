@@ -64,6 +64,7 @@ def close(session: "Session") -> None:
         pass
     transport.close()
     session.transport = Closed()
+    session.send = session.transport.send
     session.up = False
     session.login = True
     session.enter(WAITING)

@@ -44,6 +44,7 @@ class Custom:
         self._rx = bytearray(mtu)
         self._deliver: "Deliver | None" = None
         self._taken = 0
+        self._error: "int | None" = None
         self.deframer: "SerialDeframer | None" = None
         if framing:
             from muros.xrce.serial import SerialDeframer, SerialFramer
@@ -61,10 +62,16 @@ class Custom:
 
     def send(self, buf: "Buffer", off: int, n: int) -> None:
         """Sends a message."""
-        self._write(buf, off, n)
+        try:
+            self._write(buf, off, n)
+        except OSError as error:
+            self._error = error.errno
 
     def receive(self, deliver: "Deliver") -> int:
         """Delivers what has come, from up to 16 reads."""
+        if self._error is not None:
+            error_number, self._error = self._error, None
+            raise OSError(error_number)
         self._deliver = deliver
         self._taken = 0
         rx = self._rx

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _WRITE_DATA = const(7)
 _LITTLE_ENDIAN = const(0x01)
+_FIRST_REQUEST = const(10)
 _KIND_PARTICIPANT = const(1)
 _KIND_TOPIC = const(2)
 _KIND_DATAWRITER = const(5)
@@ -39,7 +40,8 @@ def publish(self: "Any", message: "Message") -> bool:
     if session.state == CONNECTED and self.todo == 0 and session.backlog is None:
         at = stream.reserve(n + 4)
         if at >= 0:
-            request = session.requests(1)
+            request = session.request
+            session.request = request + 1 if request < 0xFFFF else _FIRST_REQUEST
             head(stream.buf, at, _WRITE_DATA, _LITTLE_ENDIAN, n + 4, request, self.index << 4 | self.kind)
             try:
                 message.write(stream.buf, at + 8)

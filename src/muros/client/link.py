@@ -81,7 +81,7 @@ class Link(SessionCore):
             client_key = bytes([client_key >> shift & 255 for shift in (24, 16, 8, 0)])
         if len(client_key) != 4 or client_key == b"\0\0\0\0":
             raise ValueError("client_key must be 4 bytes or an integer from 1 to 0xFFFFFFFF")
-        super().__init__(session_id, client_key, self._send, self._on, 0)
+        super().__init__(session_id, client_key, transport.send, self._on, 0)
         self.transport = transport
         self._deliver = self.deliver  # taking a method from its object costs a board memory each time
         self.key = client_key
@@ -210,12 +210,6 @@ class Link(SessionCore):
             self._suspect = True
             self.submit(_GET_INFO, _LITTLE_ENDIAN, self.requests(1), _OBJECT_AGENT, b"\2\0\0\0")
 
-    def _send(self, buf: "Buffer", off: int, n: int) -> None:
-        try:
-            self.transport.send(buf, off, n)
-        except OSError:
-            self.up = False
-
     def _is_due(self, now: int, again: int) -> bool:
         """Whether the next attempt is due and the transport open; if so, the one after comes in ``again`` ms."""
         if self._due is not None and ticks_diff(now, self._due) < 0:
@@ -279,7 +273,7 @@ class Link(SessionCore):
         message = hello(
             self.head[0], self.key, self.mtu, self._attempt if self.properties else None, self.hard_liveliness
         )
-        self._send(message, 0, len(message))
+        self.send(message, 0, len(message))
 
     def _on_status_agent(self, status: int) -> None:
         if not self.login:

@@ -68,11 +68,14 @@ class Serial:
             self._file = None
 
     def send(self, buf: "Buffer", off: int, n: int) -> None:
-        """Sends a message as one frame; OSError when the port is gone or takes nothing for two seconds."""
-        self._framer.send(buf, off, n)
+        """Sends a message as one frame. A port that takes nothing for two seconds is closed."""
+        if self._file is not None:
+            self._framer.send(buf, off, n)
 
     def receive(self, deliver: "Deliver") -> int:
         """Delivers what has come, from up to 16 reads of 128 bytes; OSError when the port is gone."""
+        if self._file is None:
+            raise OSError(errno.ENODEV)
         self._deliver = deliver
         self._taken = 0
         for _ in range(_AT_ONCE):
@@ -117,21 +120,20 @@ class Serial:
     def _write(self, buf: bytearray, n: int) -> None:
         start = ticks_ms()
         done = 0
-        while done < n:
+        while done < n and self._file is not None:
             try:
                 got = _write_some(self._file, buf, done, n)
             except OSError as error:
                 if error.errno != errno.EAGAIN:
                     self.close()
-                    raise
+                    break
                 got = 0
+            done += got
             if not got:
                 if ticks_diff(ticks_ms(), start) > _PATIENCE:
                     self.close()
-                    raise OSError(errno.ETIMEDOUT)
+                    break
                 self._ready(_POLLOUT, 10)
-                continue
-            done += got
 
 
 if MPY:

@@ -74,7 +74,6 @@ class Session(Link):
     largest = 0
     heartbeat = 100
     creation_timeout = 1000
-    backlog: "Backlog | None" = None
 
     def __init__(
         self,
@@ -106,6 +105,7 @@ class Session(Link):
         self.drops = array("I", (0, 0, 0, 0))
         self.entities: "list[Entity]" = []
         self.objects: "dict[int, Any]" = {}  # what takes DATA, by object id
+        self.backlog: "Backlog | None" = None
         self.pending = 0  # entities that are not whole yet
         self.waiting = 0  # requests without a STATUS
         self._counts = bytearray(9)  # the next index for each kind of object

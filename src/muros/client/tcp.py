@@ -83,15 +83,19 @@ class Tcp:
             self._connected = False
 
     def send(self, buf: "Buffer", off: int, n: int) -> None:
-        """Sends a message whole; OSError when the connection is gone or takes nothing for two seconds."""
+        """Sends a message whole. A connection that takes nothing for two seconds is closed."""
+        if self._socket is None:
+            return
         head = self._head
         head[0] = n & 255
         head[1] = n >> 8
-        self._write(head, 0, _HEAD)
-        self._write(buf, off, n)
+        if self._write(head, 0, _HEAD):
+            self._write(buf, off, n)
 
     def receive(self, deliver: "Deliver") -> int:
         """Delivers up to 16 messages; OSError when the connection is gone."""
+        if self._socket is None:
+            raise OSError(errno.ECONNRESET)
         taken = 0
         while taken < _AT_ONCE:
             want = _HEAD if self._have < _HEAD else _HEAD + (self._rx[0] | self._rx[1] << 8)
@@ -138,7 +142,7 @@ class Tcp:
         copy(self._rx, at, data, 0, len(data))
         return len(data)
 
-    def _write(self, buf: "Buffer", off: int, n: int) -> None:
+    def _write(self, buf: "Buffer", off: int, n: int) -> bool:
         start = ticks_ms()
         while n:
             try:
@@ -149,15 +153,16 @@ class Tcp:
             except OSError as error:
                 if error.errno != errno.EAGAIN:
                     self.close()
-                    raise
+                    return False
                 done = 0
             if not done:
                 if ticks_diff(ticks_ms(), start) > _PATIENCE:
                     self.close()
-                    raise OSError(errno.ETIMEDOUT)
+                    return False
                 self._poll.modify(self._socket, _POLLOUT)
                 self._poll.poll(10)
                 self._poll.modify(self._socket, select.POLLIN)
                 continue
             off += done
             n -= done
+        return True

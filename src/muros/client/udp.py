@@ -29,6 +29,7 @@ class Udp:
         self._host = host
         self._port = port
         self._socket: "Any" = None
+        self._error: "int | None" = None
 
     def open(self) -> bool:
         """Opens the socket; OSError when the host's name is unknown."""
@@ -62,10 +63,13 @@ class Udp:
                 self._socket.send(memoryview(buf)[off : off + n])
         except OSError as error:
             if error.errno != errno.EAGAIN:
-                raise
+                self._error = error.errno
 
     def receive(self, deliver: "Deliver") -> int:
         """Delivers up to 16 datagrams."""
+        if self._error is not None:
+            error_number, self._error = self._error, None
+            raise OSError(error_number)
         taken = 0
         try:
             while taken < _AT_ONCE:

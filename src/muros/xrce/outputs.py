@@ -46,20 +46,21 @@ class BestEffortOutput:
 
         Writing header and payload there completes the submessage: nothing else is to be called but ``flush``.
         """
-        used = self._used + 3 & ~3
-        end = used + _HEAD + n
-        if self._used == 0 or end > self.mtu:
-            size = len(self._head)
-            end = size + _HEAD + n
+        used = self._used
+        at = used + 3 & ~3
+        end = at + _HEAD + n
+        if used == 0 or end > self.mtu:
+            at = len(self._head)
+            end = at + _HEAD + n
             if end > self.mtu or not self._open():
                 return -1
-            used = size
-        buf = self.buf
+            used = at
         base = self._base
-        for i in range(self._used, used):
-            buf[base + i] = 0
+        while used & 3:
+            self.buf[base + used] = 0
+            used += 1
         self._used = end
-        return base + used
+        return base + at
 
     def cancel(self, at: int) -> None:
         """Takes back the submessage that ``reserve`` gave last, before anything else was called."""
@@ -93,14 +94,12 @@ class BestEffortOutput:
         return True
 
     def _begin(self) -> None:
-        buf = self.buf
         base = self._base
         head = self._head
         head[1] = self.stream_id
         head[2] = self.next & 255
         head[3] = self.next >> 8
-        for i in range(len(head)):
-            buf[base + i] = head[i]
+        self.buf[base : base + len(head)] = head
         self._used = len(head)
 
 

@@ -1,0 +1,216 @@
+"""What the client and rclc may cost on a board, beside ``budgets``: programs, sessions, entities, allocation."""
+
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from muros.interfaces import board
+from muros.links import UdpLink
+from tests.client.agent_thread import RunningAgent
+from tests.micropython.budgets import (
+    Budget,
+    bytecode,
+    drift,
+    import_heap,
+    instructions,
+    live_heap,
+    object_heap,
+    smallest,
+)
+from tests.micropython.runtimes import ROOT
+from tests.micropython.tree import Tree
+
+GAUGE = ("mpy-cross", "gauge")
+
+PUBLISHER = (
+    "muros.client.custom, muros.xrce.serial, muros.client.hello, muros.rclc.context, muros.rclc.node, "
+    "muros.client.session, muros.client.entities, std_msgs.msg"
+)
+"""Everything that a program with publishers over a serial line has loaded by the time it publishes."""
+CORE = (
+    "muros.client.hello, muros.rclc.context, muros.rclc.node, muros.rclc.executor, muros.rclc.subscription, "
+    "muros.rclc.timer, muros.rclc.service, muros.client.session, muros.client.entities, muros.client.reader, "
+    "muros.client.services, muros.client.backlog, muros.client.timesync, muros.client.presence, muros.xrce.fragments"
+)
+"""Publishers, subscriptions, services, clients, timers, executor, fragments, time synchronisation, ping."""
+
+SESSION = """
+from muros.client import Session
+from muros.rclc import Context, Executor
+from tests.board.agent import Agent
+from tests.board.test_client import Number
+import muros.client.entities, muros.client.reader, muros.client.services
+import muros.rclc.subscription, muros.rclc.service, muros.rclc.timer
+class Service:
+    TYPE = "example_interfaces/srv/AddTwoInts"
+    Request = Response = Number
+context = Context(Session(Agent(256), 1))
+node = context.node("board")
+agent = Agent(256)
+"""
+CONNECTED = """
+import muros.client.link
+muros.client.link.urandom = bytes  # one of the builds has no entropy
+from tests.board.test_client import Board
+from muros.client.raw import Raw
+board = Board(256)
+session = board.session
+class Sink:
+    def send(self, buf, off, n):
+        pass
+    def receive(self, deliver):
+        return 0
+session.transport = Sink()
+session.send = session.transport.send
+message = Raw(bytes(64))
+ack = bytearray(b"\\x81\\0\\0\\0\\x0a\\x01\\x05\\0\\0\\0\\0\\0\\x80")
+def acknowledged():
+    board.reliable.publish(message)
+    ack[8] = session.reliable.next & 255
+    ack[9] = session.reliable.next >> 8
+    session.deliver(ack, 0, 13)
+    session.spin_once(board.now)
+"""
+
+
+@cache
+def messages(*names: str) -> Tree:
+    """Generated classes for boards, as files."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        return {
+            path.relative_to(folder).as_posix(): path.read_bytes() for path in board.generate(names, folder)
+        }
+
+
+def imported(modules: str, types: Sequence[str] = ()) -> float:
+    """Bytes on a 32-bit heap of some modules and of the message classes of some types."""
+    lines = [f"import {modules}"] + [f"from {t.split('/')[0]}.msg import {t.split('/')[2]}" for t in types]
+    return import_heap("\n".join(lines), messages(*types))
+
+
+def with_tests(measure: Callable[..., float], setup: str, expression: str) -> float:
+    """A measure whose set-up uses the agent and the messages of the board tests."""
+    return measure(setup, expression, _tests())
+
+
+def running(form: str, limit: int) -> float:
+    """kB of the smallest 64-bit heap in which the program talks to itself through the agent over UDP."""
+    link = UdpLink(0, "127.0.0.1")
+    agent = RunningAgent(link)
+    try:
+        arguments = ["127.0.0.1", str(link.port)]
+        return smallest("talker_listener", form, limit, arguments, messages("std_msgs/msg/String"))
+    finally:
+        agent.stop()
+
+
+def heap_of_a_program() -> float:
+    """Bytes that a publisher and a subscription of 64 B leave on a 32-bit heap, everything loaded and connected."""
+    program = (
+        "from tests.board.agent import Agent\nimport std_msgs.msg\n",
+        "from muros.client import Session\nfrom muros.rclc import Context, Executor\nfrom std_msgs.msg import String\n"
+        "context = Context(Session(Agent(256), 1))\nnode = context.node('board')\n"
+        "publisher = node.publisher(String, 'loop')\nnode.subscription(String, 'loop', print)\n"
+        "executor = Executor(context)\nfor _ in range(20): executor.spin_some()\n"
+        "publisher.publish(String(data='x' * 59))\nexecutor.spin_some()\n",
+    )
+    return live_heap(program[0], program[1], {**messages("std_msgs/msg/String"), **_tests()})
+
+
+def _tests() -> Tree:
+    names = ("agent.py", "harness.py", "test_client.py")
+    return {f"tests/board/{name}": (ROOT / "tests/board" / name).read_bytes() for name in names}
+
+
+CLIENT_BUDGETS: tuple[Budget, ...] = (
+    Budget(
+        "import of a program that publishes Int32 over serial",
+        40_000,
+        "B",
+        GAUGE,
+        partial(imported, PUBLISHER, ("std_msgs/msg/Int32",)),
+    ),
+    Budget(
+        "import of client and rclc, everything but transports", 50_000, "B", GAUGE, partial(imported, CORE)
+    ),
+    Budget(
+        "bytecode of compat, xrce, client and rclc",
+        45_000,
+        "B",
+        ("mpy-cross",),
+        partial(bytecode, ["compat.py", "xrce", "client", "rclc"]),
+    ),
+    Budget(
+        "session, MTU 256, history 4, both directions",
+        3_200,
+        "B",
+        GAUGE,
+        partial(with_tests, object_heap, SESSION, "Session(agent, 1)"),
+    ),
+    Budget(
+        "publisher",
+        160,
+        "B",
+        GAUGE,
+        partial(with_tests, object_heap, SESSION, "node.publisher(Number, 'temperature')"),
+    ),
+    Budget(
+        "subscription",
+        340,
+        "B",
+        GAUGE,
+        partial(with_tests, object_heap, SESSION, "node.subscription(Number, 'temperature', None)"),
+    ),
+    Budget(
+        "executor and timer",
+        224,
+        "B",
+        GAUGE,
+        partial(with_tests, object_heap, SESSION, "(Executor(context), node.timer(1.0, None))"),
+    ),
+    Budget(
+        "service",
+        320,
+        "B",
+        GAUGE,
+        partial(with_tests, object_heap, SESSION, "node.service(Service, 'add_two_ints', None)"),
+    ),
+    Budget("live heap, publisher and subscription of 64 B, connected", 50_000, "B", GAUGE, heap_of_a_program),
+    Budget(
+        "smallest heap of the same over UDP, as .mpy, 64 bit",
+        90,
+        "kB",
+        ("unix", "mpy-cross"),
+        partial(running, "mpy", 90),
+    ),
+    Budget(
+        "smallest heap of the same over UDP, as .py, 64 bit",
+        130,
+        "kB",
+        ("unix",),
+        partial(running, "py", 130),
+    ),
+    Budget(
+        "instructions to publish 64 B, best effort",
+        60_000,
+        "",
+        ("fuel", "mpy-cross"),
+        partial(with_tests, instructions, CONNECTED, "board.loose.publish(message)"),
+    ),
+    Budget(
+        "instructions to publish 64 B, reliable, acknowledged, and to spin",
+        160_000,
+        "",
+        ("fuel", "mpy-cross"),
+        partial(with_tests, instructions, CONNECTED, "acknowledged()"),
+    ),
+    Budget(
+        "drift of the heap over 20 000 acknowledged messages",
+        0,
+        "B",
+        GAUGE,
+        lambda: drift(CONNECTED, "acknowledged()", 20_000, _tests()),
+    ),
+)
