@@ -7,13 +7,14 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from tests.micropython.budgets import BUDGETS  # noqa: E402
+from tests.micropython.client_budgets import CLIENT_BUDGETS  # noqa: E402
 
 
 def main() -> int:
     """Exit status 1 when a row is over its budget."""
     over = 0
     print(f"{'what':<60} {'today':>10} {'budget':>10}")
-    for budget in BUDGETS:
+    for budget in (*BUDGETS, *CLIENT_BUDGETS):
         figure = budget.measure()
         mark = "" if figure <= budget.limit else "  OVER"
         over += bool(mark)
