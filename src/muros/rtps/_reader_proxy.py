@@ -1,0 +1,53 @@
+"""What a writer knows of one matched reader (DDSI-RTPS 2.3, 8.4.7.2)."""
+
+from collections.abc import Iterable
+
+from muros.rtps._endpoint import NEVER, Place
+from muros.rtps._values import EntityId, Guid, GuidPrefix, guid_of
+
+__all__ = ["ReaderProxy"]
+
+
+class ReaderProxy:
+    """One matched reader: where it is, what it has, what it wants again."""
+
+    __slots__ = (
+        "acked", "aside", "count", "due", "entity", "fragment_count", "inline_qos", "interval", "places", "prefix",
+        "reliable", "repaired", "repaired_at", "since", "start", "wanted",
+    )  # fmt: skip
+
+    def __init__(
+        self, prefix: GuidPrefix, entity: EntityId, places: tuple[Place, ...], reliable: bool, start: int
+    ) -> None:
+        self.prefix = prefix
+        self.entity = entity
+        self.places = places
+        self.reliable = reliable
+        self.inline_qos = False
+        """Whether it wants the endpoint's QoS with every sample."""
+        self.start = start
+        """The first sample meant for it."""
+        self.acked = start - 1
+        """It has everything up to here."""
+        self.aside = False
+        """It holds nobody, having been silent for too long."""
+        self.count: int | None = None
+        """Count of its last ACKNACK."""
+        self.fragment_count: int | None = None
+        """Count of its last NACK_FRAG."""
+        self.due = NEVER
+        """When it gets the next heartbeat."""
+        self.interval = 0
+        """Pause after that one."""
+        self.since = 0
+        """Time of its last progress while it lags."""
+        self.wanted: dict[int, Iterable[int] | None] = {}
+        """What is to be sent again: samples, of some only these fragments."""
+        self.repaired: set[int] = set()
+        """What was sent again since `repaired_at`; 0 stands for a GAP."""
+        self.repaired_at = 0
+
+    @property
+    def guid(self) -> Guid:
+        """The reader's GUID."""
+        return guid_of(self.prefix, self.entity)

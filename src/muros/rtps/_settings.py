@@ -1,0 +1,82 @@
+"""The bounds and times of writers and readers. All times are in ns, all sizes in bytes."""
+
+from dataclasses import dataclass
+from typing import Final
+
+from muros.rtps._endpoint import MILLISECOND, SECOND
+
+__all__ = ["READER_DEFAULTS", "WRITER_DEFAULTS", "ReaderSettings", "WriterSettings"]
+
+
+@dataclass(frozen=True, slots=True)
+class WriterSettings:
+    """Bounds and times of writers; one value serves many of them. Times are in ns, sizes in bytes."""
+
+    limit: int = 5000
+    """Samples held while they wait for acknowledgement by a writer that keeps all (and for late readers)."""
+    fragment_size: int = 65000
+    """Larger samples are sent in fragments of this size; small samples are sent again together up to it.
+
+    One UDP datagram of it with its headers has to pass: 65000 on one machine and where IP fragments well,
+    1300 on networks that lose fragments. At most 65000.
+    """
+    heartbeat_period: int = 20 * MILLISECOND
+    """A sample not acknowledged for this long is asked after; the pause doubles while there is no progress."""
+    heartbeat_slowest: int = SECOND
+    """The longest pause."""
+    hold_off: int = 10 * MILLISECOND
+    """What was sent again to a reader is not sent once more to it within this time."""
+    burst: int = 256 * 1024
+    """Bytes of fragments and repairs sent in one go."""
+    pace: int = MILLISECOND
+    """Time in which `burst` is allowed again."""
+    patience: int = 10 * SECOND
+    """A reader that acknowledges nothing for this long, and makes the writer refuse samples, is set aside."""
+
+    def __post_init__(self) -> None:
+        for name in (
+            "limit",
+            "fragment_size",
+            "heartbeat_period",
+            "heartbeat_slowest",
+            "burst",
+            "pace",
+            "patience",
+        ):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
+        if self.fragment_size > 65000 or self.hold_off < 0:
+            raise ValueError("fragment_size must be at most 65000 bytes and hold_off not negative")
+
+
+WRITER_DEFAULTS: Final = WriterSettings()
+
+
+@dataclass(frozen=True, slots=True)
+class ReaderSettings:
+    """Bounds and times of readers; one value serves many of them. Times are in ns, sizes in bytes."""
+
+    window: int = 1024
+    """Samples of one writer may come early by this many numbers."""
+    memory: int = 64 << 20
+    """Bytes held for one writer: samples that came early, and those being put together. No larger one can come."""
+    response_delay: int = 0
+    """A heartbeat is answered after this time, together with those that follow it."""
+    hold_off: int = 10 * MILLISECOND
+    """What is missing is asked for again after this time, or when some of it has come."""
+    hello_period: int = 100 * MILLISECOND
+    """A writer of which nothing is known is asked again after this time; the pause doubles."""
+    hellos: int = 8
+    """How often it is asked."""
+    assembly_time: int = 3 * SECOND
+    """Fragments of a best-effort sample are dropped when the rest has not come after this time."""
+
+    def __post_init__(self) -> None:
+        for name in ("window", "memory", "hello_period", "hellos", "assembly_time"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
+        if self.response_delay < 0 or self.hold_off < 0:
+            raise ValueError("response_delay and hold_off must not be negative")
+
+
+READER_DEFAULTS: Final = ReaderSettings()

@@ -1,0 +1,610 @@
+"""The sending side of a topic: a stateful writer, best effort or reliable (DDSI-RTPS 2.3, 8.4.7 to 8.4.9).
+
+Theory of operation. A sample is sent once to every place where a matched reader listens, addressed to all readers
+there. A reliable writer keeps it until the readers have acknowledged it, and knows of each of them (`ReaderProxy`)
+up to where it has. While one of them lags it is told by HEARTBEATs what there is: with a sample now and then as
+samples flow, and by a timer of each reader that backs off while nothing comes back. When all have everything the
+writer is silent. What a reader misses it asks for in ACKNACK or NACK_FRAG; that is sent to it alone, with a GAP for
+what it shall not wait for, and a HEARTBEAT behind, so that it asks for more at once. A reader that comes late to a
+transient local writer is simply one that lags from the oldest sample kept.
+
+Nothing is sent in floods: fragments and repairs wait in queues and leave within an allowance of `burst` bytes that
+is filled up every `pace`.
+
+A writer that keeps all refuses a sample when `limit` samples wait for acknowledgement. A reader that acknowledges
+nothing for `patience` in that situation is set aside: it holds nobody any more, and is served again from what there
+is when it returns.
+"""
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from typing import Final
+
+from muros.rtps._constants import ENTITYID_UNKNOWN
+from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, newer
+from muros.rtps._fragments import fragments_of
+from muros.rtps._history import History, Sample
+from muros.rtps._reader_proxy import ReaderProxy
+from muros.rtps._sending import Allowance, Packet
+from muros.rtps._settings import WRITER_DEFAULTS, WriterSettings
+from muros.rtps._values import EntityId, Guid, GuidPrefix, split_guid
+from muros.rtps._wire import (
+    MAX_SUBMESSAGE,
+    AckNack,
+    NackFrag,
+    data,
+    data_frag,
+    gap,
+    heartbeat,
+    info_ts,
+    split_numbers,
+)
+
+__all__ = ["WriterCore"]
+
+FRAGMENT_HEAD: Final = 32
+"""Bytes of a DATA_FRAG between its header and its inline QoS."""
+
+SENTINEL_SIZE: Final = 4
+"""Bytes of the mark at the end of a parameter list."""
+
+WANTED_MOST: Final = 512
+"""Samples waiting to be sent again to one reader; what it asks for beyond, it will ask for again."""
+
+ASK_LEAST: Final = 8
+"""A writer that keeps few samples asks for acknowledgement this often, in samples, ..."""
+
+ASK_MOST: Final = 64
+"""... and one that keeps many this often."""
+
+
+class WriterCore:
+    """One writer. Calls with `now` (ns, monotonic) may change `deadline`; look at it afterwards.
+
+    guid: the writer's GUID; the entity kind in it says whether the topic has a key.
+    send: takes what is to be sent; called from within the methods.
+    reliable: what readers do not acknowledge is sent again to those that match as reliable ones.
+    transient_local: reliable readers that come late and want it get what is kept.
+    depth: samples kept of each instance, None = all; with a depth, new samples push old ones out, acknowledged or not.
+    lifespan: a sample is not sent any more when older than this (ns); 0 = none.
+    endpoint_qos: a parameter list sent with every sample while a reader is matched that expects inline QoS.
+    last: the sequence number of the last sample written by an earlier life of the same GUID.
+    report: told of `Problem`s. on_room: called when samples are accepted again after `write` has refused one.
+
+    Raises ValueError for settings out of range.
+    """
+
+    __slots__ = (
+        "_allowance", "_ask_at", "_ask_every", "_at", "_count", "_cursor", "_endpoint_qos", "_entity",
+        "_history", "_idle", "_lagging", "_lifespan", "_on_room", "_proxies", "_refused", "_reliable", "_repairing",
+        "_report", "_retains", "_routes", "_send", "_unasked", "_unsent", "_with_qos", "guid", "last", "reliable",
+        "sent", "settings",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        guid: Guid,
+        send: Send,
+        *,
+        reliable: bool = True,
+        transient_local: bool = False,
+        depth: int | None = 1,
+        lifespan: int = 0,
+        endpoint_qos: bytes = b"",
+        last: int = 0,
+        settings: WriterSettings = WRITER_DEFAULTS,
+        report: Report | None = None,
+        on_room: Callable[[], object] | None = None,
+    ) -> None:
+        self.guid: Final = guid
+        self.reliable: Final = reliable
+        self.settings: Final = settings
+        self.last = last
+        """Sequence number of the last sample written."""
+        self.sent = last
+        """Everything up to here has left; less than `last` while fragments wait."""
+        self._entity = split_guid(guid)[1]
+        self._send = send
+        self._report = report
+        self._on_room = on_room
+        self._history = History(depth)
+        self._retains = reliable and transient_local
+        self._lifespan = lifespan
+        self._endpoint_qos = endpoint_qos
+        self._with_qos = False
+        self._proxies: dict[tuple[GuidPrefix, EntityId], ReaderProxy] = {}
+        self._reliable = 0  # how many of them are reliable
+        self._idle: dict[ReaderProxy, None] = {}  # those that have everything
+        self._lagging: dict[ReaderProxy, None] = {}  # those that do not
+        self._repairing: dict[ReaderProxy, None] = {}  # those that want something again
+        self._routes: tuple[Place, ...] = ()  # every place where a reader listens, once
+        self._unsent: deque[int] = deque()  # samples waiting to leave
+        self._cursor = 0  # fragments of the first of them that have left
+        self._allowance = Allowance(settings.burst, settings.pace)
+        self._count = 0
+        self._ask_at = 0
+        kept = settings.limit if depth is None else max(depth, ASK_LEAST * 4)
+        self._ask_every = max(1, min(ASK_MOST, kept // 4))
+        self._unasked = 0
+        self._refused = False
+        self._at = NEVER
+
+    @property
+    def deadline(self) -> int | None:
+        """When `tick` is needed next; None = not before something else happens."""
+        return None if self._at == NEVER else self._at
+
+    @property
+    def readers(self) -> tuple[ReaderProxy, ...]:
+        """The matched readers."""
+        return tuple(self._proxies.values())
+
+    @property
+    def held(self) -> int:
+        """Samples kept."""
+        return len(self._history)
+
+    @property
+    def acknowledged(self) -> int:
+        """All reliable readers that are not set aside have everything up to this sequence number."""
+        return min((p.acked for p in self._lagging if not p.aside), default=self.sent)
+
+    def match(
+        self,
+        reader: Guid,
+        places: Iterable[Place],
+        now: int,
+        *,
+        reliable: bool,
+        transient_local: bool = False,
+        expects_inline_qos: bool = False,
+    ) -> None:
+        """A reader wants the samples from now on (8.4.9.1.1); `transient_local`: those kept, too.
+
+        Everything for it goes to each of `places`. For a reader that is matched already only they are changed.
+        """
+        key = split_guid(reader)
+        proxy = self._proxies.get(key)
+        if proxy is not None:
+            proxy.places = tuple(places)
+            self._reroute()
+            return
+        start = self.sent + 1
+        if self._retains and reliable and transient_local:
+            self._expire(now)
+            start = self._lowest()
+        proxy = self._proxies[key] = ReaderProxy(*key, tuple(places), self.reliable and reliable, start)
+        proxy.inline_qos = expects_inline_qos
+        self._reroute()
+        if proxy.reliable:
+            lags = proxy.acked < self.sent
+            if lags:
+                self._now_lags(proxy, now)
+            else:
+                self._idle[proxy] = None
+            self._send_heartbeat(proxy, final=not lags)
+
+    def unmatch(self, reader: Guid, now: int) -> None:
+        """The reader has gone or no longer fits; nothing happens when it is not matched."""
+        proxy = self._proxies.pop(split_guid(reader), None)
+        if proxy is None:
+            return
+        for proxies in (self._idle, self._lagging, self._repairing):
+            proxies.pop(proxy, None)
+        self._reroute()
+        if not self._routes:
+            self._unsent.clear()
+            self._cursor = 0
+            self.sent = self.last
+        self._release(now)
+
+    def write(
+        self,
+        payload: bytes,
+        now: int,
+        source_time: int | None = None,
+        inline_qos: bytes = b"",
+        *,
+        key: bool = False,
+        instance: bytes = b"",
+        last: bool = False,
+    ) -> int | None:
+        """Write a sample; returns its sequence number, or None when a writer that keeps all has no room now.
+
+        payload: begins with its encapsulation. source_time: ns since 1970. inline_qos: a little-endian parameter
+        list. instance: names the instance of a topic with a key. key: the payload is only the key. last: the
+        instance ends here, and is forgotten when all readers know.
+
+        ValueError when the inline QoS are too large or the time does not fit RTPS.
+        """
+        settings = self.settings
+        stamp = info_ts(source_time)
+        qos = inline_qos
+        if self._with_qos:
+            qos = inline_qos[:-SENTINEL_SIZE] + self._endpoint_qos
+        whole = len(payload) + len(qos) <= settings.fragment_size
+        if not whole and settings.fragment_size + len(qos) > MAX_SUBMESSAGE - FRAGMENT_HEAD:
+            raise ValueError(f"inline QoS of {len(qos)} bytes do not fit beside a fragment")
+        sequence = self.last + 1
+        sample = Sample(sequence, payload, stamp, qos, key, instance, last)
+        if self._reliable or self._retains or self._unsent or not whole:
+            if self._lifespan:
+                sample.expires = now + self._lifespan
+                self._at = min(self._at, sample.expires)
+                self._expire(now)
+            if self._is_full() and not self._make_room(now):
+                self._refused = True
+                self._at = min(self._at, self._patience_ends())
+                return None
+            self._history.add(sample)
+        self.last = sequence
+        if not self._routes:
+            self.sent = sequence
+        elif self._unsent or not whole:
+            self._unsent.append(sequence)
+            self._pump(now)
+        else:
+            self._transmit(sample, now)
+        if last and not self._lagging:
+            self._release(now)
+        return sequence
+
+    def on_acknack(self, event: AckNack, now: int) -> None:
+        """A reader says what it has and what it misses (8.4.7.5). Others' and old ones are ignored."""
+        proxy = self._proxies.get((event.source, event.reader))
+        if proxy is None or not proxy.reliable or not newer(event.count, proxy.count):
+            return
+        is_first, proxy.count = proxy.count is None, event.count
+        acked = min(event.base - 1, self.sent)
+        progress = acked > proxy.acked
+        if progress:
+            self._advance(proxy, acked, now)
+        repairs = bool(event.missing) and self._want(proxy, event, now)
+        if repairs:
+            self._repair(now)
+        elif not event.final:
+            # One that is not final asks for an answer. The answer must not ask back when nothing has changed:
+            # two such sides would not come to rest.
+            self._send_heartbeat(proxy, final=proxy in self._idle or not (progress or is_first))
+        if progress:
+            self._release(now)
+
+    def on_nack_frag(self, event: NackFrag, now: int) -> None:
+        """A reader misses fragments of a sample (8.3.7.10)."""
+        proxy = self._proxies.get((event.source, event.reader))
+        if proxy is None or not proxy.reliable or not newer(event.count, proxy.fragment_count):
+            return
+        proxy.fragment_count = event.count
+        number = event.sequence
+        if (
+            not proxy.acked < number <= self.sent
+            or number in proxy.wanted
+            or len(proxy.wanted) >= WANTED_MOST
+        ):
+            return
+        sample = self._history.get(number)
+        if sample is not None:
+            total = fragments_of(len(sample.payload), self.settings.fragment_size)
+            fragments = [fragment for fragment in event.missing if 1 <= fragment <= total]
+            if not fragments:
+                return
+            proxy.wanted[number] = fragments
+        else:
+            proxy.wanted[number] = None  # becomes a GAP
+        self._repairing[proxy] = None
+        self._repair(now)
+
+    def assert_liveliness(self, now: int) -> None:
+        """Say that a writer with manual liveliness is alive (8.3.7.5: HEARTBEAT with the liveliness flag)."""
+        first = self._lowest()
+        self._count += 1
+        beat = heartbeat(
+            ENTITYID_UNKNOWN, self._entity, first, self.sent, self._count, final=True, liveliness=True
+        )
+        for place in self._routes:
+            self._send([beat], None, place)
+
+    def tick(self, now: int) -> int | None:
+        """Do what is due at `now`; returns the new `deadline`."""
+        self._pump(now)
+        self._repair(now)
+        expires = self._expire(now) if self._lifespan else NEVER
+        due = [proxy for proxy in self._lagging if proxy.due <= now]
+        if due:
+            self._beat(due, now)
+        if self._refused and self._make_room(now):
+            self._tell_room()
+        self._at = min((proxy.due for proxy in self._lagging), default=NEVER)
+        self._at = min(self._at, expires)
+        if self._unsent or self._repairing:
+            self._at = min(self._at, now + self.settings.pace)
+        if self._refused:
+            self._at = min(self._at, self._patience_ends())
+        return self.deadline
+
+    # --- Sending -----------------------------------------------------------------------------------------
+
+    def _transmit(self, sample: Sample, now: int) -> None:
+        """Send a sample that fits a datagram to everybody."""
+        self.sent = sample.sequence
+        content = data(
+            ENTITYID_UNKNOWN,
+            self._entity,
+            self.sent,
+            sample.payload,
+            inline_qos=sample.inline_qos,
+            key=sample.key,
+        )
+        submessages = [sample.stamp, content]
+        if self._reliable:
+            self._expect(now)
+            self._unasked += 1
+            if now >= self._ask_at or self._unasked >= self._ask_every:
+                submessages.append(self._ask(now))
+        send = self._send
+        for place in self._routes:
+            send(submessages, None, place)
+
+    def _pump(self, now: int) -> None:
+        """Send what waits, as far as the allowance goes."""
+        unsent = self._unsent
+        if not unsent:
+            return
+        size = self.settings.fragment_size
+        while unsent:
+            sample = self._history.get(unsent[0])
+            if sample is None:  # pushed out by newer ones
+                self.sent = unsent[0]
+            elif len(sample.payload) + len(sample.inline_qos) <= size:
+                self._transmit(sample, now)
+            else:
+                total = fragments_of(len(sample.payload), size)
+                while self._cursor < total:
+                    if not self._may_send(now):
+                        return
+                    self._cursor += 1
+                    submessages = [sample.stamp, self._fragment(ENTITYID_UNKNOWN, sample, self._cursor)]
+                    if self._cursor == total:
+                        self.sent = sample.sequence
+                        if self._reliable:
+                            self._expect(now)
+                            submessages.append(self._ask(now))
+                    self._allowance.spend(size * len(self._routes))
+                    for place in self._routes:
+                        self._send(submessages, None, place)
+            self._cursor = 0
+            unsent.popleft()
+        if not self._lagging:
+            self._release(now)
+
+    def _repair(self, now: int) -> None:
+        """Send again what readers want, to them alone, as far as the allowance goes."""
+        for proxy in tuple(self._repairing):
+            packet = Packet(self._send, proxy, self.settings.fragment_size)
+            gone: list[int] = []
+            while proxy.wanted and self._may_send(now):
+                number = next(iter(proxy.wanted))
+                fragments = proxy.wanted.pop(number)
+                sample = self._history.get(number)
+                if sample is None:
+                    gone.append(number)
+                    continue
+                if len(sample.payload) + len(sample.inline_qos) <= packet.size:
+                    content = data(
+                        proxy.entity, self._entity, number, sample.payload,
+                        inline_qos=sample.inline_qos, key=sample.key,
+                    )  # fmt: skip
+                    packet.add(sample.stamp, content)
+                    self._allowance.spend(len(content) * len(proxy.places))
+                else:
+                    self._repair_fragments(packet, proxy, sample, fragments, now)
+            for submessage in self._gaps(proxy, sorted(gone)):
+                packet.add(submessage)
+            if not proxy.wanted:
+                del self._repairing[proxy]
+                packet.add(self._heartbeat(proxy, final=False))
+            packet.flush()
+        if self._repairing:
+            self._at = min(self._at, now + self.settings.pace)
+
+    def _repair_fragments(
+        self, packet: Packet, proxy: ReaderProxy, sample: Sample, fragments: Iterable[int] | None, now: int
+    ) -> None:
+        """Send fragments again, None = all; those beyond the allowance go back to what is wanted."""
+        if fragments is None:
+            fragments = range(1, fragments_of(len(sample.payload), packet.size) + 1)
+        numbers = iter(fragments)
+        for number in numbers:
+            if not self._may_send(now):
+                proxy.wanted = {sample.sequence: [number, *numbers], **proxy.wanted}
+                return
+            packet.add(sample.stamp, self._fragment(proxy.entity, sample, number))
+            self._allowance.spend(packet.size * len(proxy.places))
+
+    def _fragment(self, reader: EntityId, sample: Sample, number: int) -> bytes:
+        payload, size = sample.payload, self.settings.fragment_size
+        part = payload[(number - 1) * size : number * size]
+        return data_frag(
+            reader, self._entity, sample.sequence, number, 1, size, len(payload), part,
+            inline_qos=sample.inline_qos, key=sample.key,
+        )  # fmt: skip
+
+    def _may_send(self, now: int) -> bool:
+        """Whether the allowance is not used up; if it is, `tick` is needed after `pace`."""
+        if self._allowance.allows(now):
+            return True
+        self._at = min(self._at, now + self.settings.pace)
+        return False
+
+    def _gaps(self, proxy: ReaderProxy, gone: list[int]) -> list[bytes]:
+        """GAPs for these rising numbers."""
+        submessages = []
+        for base, numbers in split_numbers(gone):
+            end = base + 1
+            while end - base < len(numbers) and numbers[end - base] == end:
+                end += 1
+            submessages.append(gap(proxy.entity, self._entity, base, end, numbers[end - base :]))
+        return submessages
+
+    # --- Heartbeats --------------------------------------------------------------------------------------
+
+    def _ask(self, now: int) -> bytes:
+        """A heartbeat for everybody that asks for acknowledgement, to go with a sample."""
+        self._unasked = 0
+        self._ask_at = now + self.settings.heartbeat_period // 2
+        self._count += 1
+        return heartbeat(ENTITYID_UNKNOWN, self._entity, self._lowest(), self.sent, self._count)
+
+    def _heartbeat(self, proxy: ReaderProxy, *, final: bool) -> bytes:
+        """A heartbeat for one reader: it counts what is meant for that one only."""
+        self._count += 1
+        first = max(self._lowest(), proxy.start)
+        return heartbeat(proxy.entity, self._entity, first, self.sent, self._count, final=final)
+
+    def _send_heartbeat(self, proxy: ReaderProxy, *, final: bool) -> None:
+        beat = self._heartbeat(proxy, final=final)
+        for place in proxy.places:
+            self._send([beat], proxy.prefix, place)
+
+    def _beat(self, due: list[ReaderProxy], now: int) -> None:
+        """Ask lagging readers for acknowledgement, those of one participant together."""
+        groups: dict[tuple[GuidPrefix, tuple[Place, ...]], list[ReaderProxy]] = {}
+        for proxy in due:
+            groups.setdefault((proxy.prefix, proxy.places), []).append(proxy)
+            proxy.interval = min(proxy.interval * 2, self.settings.heartbeat_slowest)
+            proxy.due = now + proxy.interval
+        for (prefix, places), proxies in groups.items():
+            if len(proxies) == 1:
+                self._send_heartbeat(proxies[0], final=False)
+                continue
+            self._count += 1
+            first = max(self._lowest(), min(proxy.start for proxy in proxies))
+            beat = heartbeat(ENTITYID_UNKNOWN, self._entity, first, self.sent, self._count)
+            for place in places:
+                self._send([beat], prefix, place)
+
+    # --- Readers -----------------------------------------------------------------------------------------
+
+    def _expect(self, now: int) -> None:
+        """Something was sent: the readers that had everything lag now."""
+        if self._idle:
+            for proxy in self._idle:
+                self._now_lags(proxy, now)
+            self._idle.clear()
+
+    def _now_lags(self, proxy: ReaderProxy, now: int) -> None:
+        proxy.since = now
+        proxy.interval = self.settings.heartbeat_period
+        proxy.due = now + proxy.interval
+        self._lagging[proxy] = None
+        self._at = min(self._at, proxy.due)
+
+    def _advance(self, proxy: ReaderProxy, acked: int, now: int) -> None:
+        """A reader has more than before."""
+        if proxy.aside:
+            proxy.aside = False
+            self._tell(Problem.READER_RETURNED, proxy, max(0, self._lowest() - 1 - proxy.acked))
+        proxy.acked = acked
+        for number in [number for number in proxy.wanted if number <= acked]:
+            del proxy.wanted[number]
+        if acked == self.sent:
+            self._lagging.pop(proxy, None)
+            self._repairing.pop(proxy, None)
+            proxy.due = NEVER
+            self._idle[proxy] = None
+        else:
+            self._now_lags(proxy, now)
+
+    def _want(self, proxy: ReaderProxy, event: AckNack, now: int) -> bool:
+        """Queue what a reader misses; False when nothing of it is to be sent (again) now."""
+        if now - proxy.repaired_at >= self.settings.hold_off:
+            proxy.repaired.clear()
+            proxy.repaired_at = now
+        lowest = max(proxy.start, self._lowest())
+        repaired, wanted = proxy.repaired, proxy.wanted
+        before = len(wanted)
+        gap_sent = False
+        for number in event.missing:
+            if number > self.sent:
+                break
+            if number < lowest:
+                if 0 not in repaired:
+                    repaired.add(0)
+                    gap_sent = True
+                    skip = gap(proxy.entity, self._entity, max(event.base, 1), lowest)
+                    for place in proxy.places:
+                        self._send([skip], proxy.prefix, place)
+            elif number not in repaired and number not in wanted and len(wanted) < WANTED_MOST:
+                repaired.add(number)
+                wanted[number] = None
+        if len(wanted) > before or gap_sent:
+            self._repairing[proxy] = None
+            return True
+        return False
+
+    def _reroute(self) -> None:
+        """The readers have changed: gather what is asked of all of them for every sample."""
+        proxies = self._proxies.values()
+        self._routes = tuple(dict.fromkeys(place for proxy in proxies for place in proxy.places))
+        self._reliable = sum(proxy.reliable for proxy in proxies)
+        self._with_qos = bool(self._endpoint_qos) and any(proxy.inline_qos for proxy in proxies)
+
+    # --- Keeping -----------------------------------------------------------------------------------------
+
+    def _lowest(self) -> int:
+        """The first sample that can be had: one kept, or the next to be written."""
+        first = self._history.first()
+        return self.sent + 1 if first is None else min(first, self.sent + 1)
+
+    def _is_full(self) -> bool:
+        return self._history.depth is None and len(self._history) >= self.settings.limit
+
+    def _make_room(self, now: int) -> bool:
+        """Whether a writer that keeps all can keep one more, after forgetting what need not be kept."""
+        if not self._is_full():
+            return True
+        if not self._drop_acknowledged():
+            for proxy in self._lagging:
+                if not proxy.aside and now - proxy.since >= self.settings.patience:
+                    proxy.aside = True
+                    self._tell(Problem.READER_STALLED, proxy, self.sent - proxy.acked)
+            self._drop_acknowledged()
+        return not self._is_full()
+
+    def _drop_acknowledged(self) -> bool:
+        """Forget samples everybody has: all of them, or as many as are needed when they are kept for late readers."""
+        acknowledged = self.acknowledged
+        if self._retains:
+            first = self._history.first()
+            if first is not None and first <= acknowledged:
+                self._history.drop_to(first)
+        else:
+            self._history.drop_to(acknowledged)
+        return not self._is_full()
+
+    def _release(self, now: int) -> None:
+        """Readers have acknowledged or gone: forget what is no longer needed, and say that there is room."""
+        if self._retains:
+            self._history.end_to(self.acknowledged)
+        else:
+            self._history.drop_to(self.acknowledged)
+        if self._refused and self._make_room(now):
+            self._tell_room()
+
+    def _expire(self, now: int) -> int:
+        """Forget what has outlived its lifespan; when to look again."""
+        return self._history.expire(now) if self._lifespan else NEVER
+
+    def _patience_ends(self) -> int:
+        """When the next reader may be set aside."""
+        waiting = (proxy.since for proxy in self._lagging if not proxy.aside)
+        return min(waiting, default=NEVER - self.settings.patience) + self.settings.patience
+
+    def _tell_room(self) -> None:
+        self._refused = False
+        if self._on_room is not None:
+            self._on_room()
+
+    def _tell(self, problem: Problem, proxy: ReaderProxy, number: int) -> None:
+        if self._report is not None:
+            self._report(problem, proxy.guid, number)
