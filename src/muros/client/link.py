@@ -10,9 +10,9 @@ Theory of operation. The connection walks through four states, by the table ``_N
   anew, or our address changed), the session connects again and sends once more what was never acknowledged.
 
 A CREATE_CLIENT that the network repeats or delays makes the reference agent begin its streams again behind our back.
-Such a session is out of step: the agent acknowledges numbers of another one. When it says twice that it waits for
-number 0, although that is long acknowledged, or ``_FOREIGN`` times in a row anything else that cannot be, the session
-connects again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2, 8.3.5 and 8.4.
+Such a session is out of step: the agent acknowledges numbers of another one. When it waits for number 0 although that
+is acknowledged and later messages came, or says ``_FOREIGN`` times in a row what cannot be, the session connects
+again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2, 8.3.5 and 8.4.
 """
 
 from muros.compat import const, ticks_add, ticks_diff, ticks_ms, urandom
@@ -50,6 +50,7 @@ _INFO = const(6)
 _LITTLE_ENDIAN = const(0x01)
 _OBJECT_AGENT = const(0xFFFD)
 _FIRST_REQUEST = const(10)
+_STREAM_RELIABLE = const(0x80)
 _SOON = const(250)  # ms between attempts while an agent is expected back
 _SLOWLY = const(5000)  # ms until a refused session asks again
 _TRIES = const(4)  # unanswered attempts to connect again until we wait
@@ -95,7 +96,7 @@ class Link(SessionCore):
         self._heard = 0
         self._tries = 0
         self._ping = 0  # the request id of the question that is open
-        self._suspect = False
+        self._probe = 0  # the number of a message that tells whether the agent's streams began again, plus 1
 
     def spin_once(self, now: "int | None" = None) -> int:
         """Takes what has come and does what is due; returns the number of messages taken. Never waits."""
@@ -198,17 +199,23 @@ class Link(SessionCore):
     def _on_acknack(self, buf: "Buffer", at: int, flags: int) -> None:
         super()._on_acknack(buf, at, flags)
         if self.foreign == 0:
-            self._suspect = False
+            self._probe = 0
         elif buf[at] == 0 and buf[at + 1] == 0:
-            self._suspect_reset()
+            missing = buf[at + 2] << 8 | buf[at + 3]
+            if self._probe == 0:
+                self._suspect()
+            elif missing >> self._probe - 2 & 1 or (self._probe > 16 and missing == 0):
+                self.foreign = _FOREIGN
 
-    def _suspect_reset(self) -> None:
-        """The agent may have begun its streams again: a message on the reliable one has it tell its numbers."""
-        if self._suspect and self.foreign:
-            self.foreign = _FOREIGN
-        elif not self._suspect:
-            self._suspect = True
-            self.submit(_GET_INFO, _LITTLE_ENDIAN, self.requests(1), _OBJECT_AGENT, b"\2\0\0\0")
+    def _suspect(self) -> None:
+        """The agent may have begun its streams again: a message on the reliable one has it tell its numbers.
+
+        An acknowledgement that waits for number 0 may be old; one that knows of this message is not.
+        """
+        stream = self.outputs[_STREAM_RELIABLE]
+        if stream.first:
+            self._probe = stream.next + 1
+        self.submit(_GET_INFO, _LITTLE_ENDIAN, self.requests(1), _OBJECT_AGENT, b"\2\0\0\0")
 
     def _is_due(self, now: int, again: int) -> bool:
         """Whether the next attempt is due and the transport open; if so, the one after comes in ``again`` ms."""
@@ -277,12 +284,12 @@ class Link(SessionCore):
 
     def _on_status_agent(self, status: int) -> None:
         if not self.login:
-            self._suspect_reset()  # the network repeated our CREATE_CLIENT
+            self._suspect()  # the network repeated our CREATE_CLIENT
         elif status < 0x80:
             self.login = False
             self._attempt = b""
             self.foreign = 0
-            self._suspect = False
+            self._probe = 0
             self._heard = self.now
             self.accepted()
             self.happened(_ACCEPTED)
