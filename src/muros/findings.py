@@ -20,6 +20,9 @@ __all__ = ["Finding", "Findings", "Severity"]
 CAPACITY: Final = 1000
 """Different findings remembered."""
 
+MEMORY: Final = 600.0
+"""Seconds after which a finding that does not come again makes room for new ones."""
+
 SUMMARY_PERIOD: Final = 10.0
 """Seconds between two summaries of the same finding."""
 
@@ -105,13 +108,18 @@ class Findings:
     """Counts findings, summarises repeats, tells watchers.
 
     `capacity`: different findings remembered. `summary_period`: seconds between two summaries of one finding.
+    `memory`: seconds after which one that did not come again makes room for a new one.
     """
 
-    def __init__(self, *, capacity: int = CAPACITY, summary_period: float = SUMMARY_PERIOD) -> None:
-        if capacity < 1 or not summary_period > 0:
-            raise ValueError("capacity must be at least 1 and summary_period more than 0 seconds")
+    def __init__(
+        self, *, capacity: int = CAPACITY, summary_period: float = SUMMARY_PERIOD, memory: float = MEMORY
+    ) -> None:
+        if capacity < 1 or not summary_period > 0 or not memory > 0:
+            raise ValueError("capacity must be at least 1, summary_period and memory more than 0 seconds")
         self.capacity: Final = capacity
         self.summary_period: Final = summary_period
+        self.memory: Final = memory
+        self._swept = 0.0
         self._entries: dict[str, dict[tuple[str, str], _Entry]] = {}
         self._folded: dict[str, _Entry] = {}
         self._size = 0
@@ -204,13 +212,29 @@ class Findings:
     def forget(self, who: str) -> None:
         """`who` has gone: drop its findings (untold repeats are told first); `counts` keeps their numbers."""
         for entry in self._entries.pop(who, {}).values():
-            if entry in self._due:
-                self._tell(entry, entry.last)
-            self._size -= 1
-            code = entry.code
-            if code not in self._forgotten and len(self._forgotten) >= CODE_CAPACITY:
-                code = OTHER_CODE
-            self._forgotten[code] = self._forgotten.get(code, 0) + entry.count
+            self._drop(entry)
+
+    def _drop(self, entry: "_Entry") -> None:
+        if entry in self._due:
+            self._tell(entry, entry.last)
+        self._size -= 1
+        code = entry.code
+        if code not in self._forgotten and len(self._forgotten) >= CODE_CAPACITY:
+            code = OTHER_CODE
+        self._forgotten[code] = self._forgotten.get(code, 0) + entry.count
+
+    def _make_room(self, now: float) -> None:
+        """Drop what has not come for long; looked for once a second at most, as a flood of new ones may go on."""
+        if 0 <= now - self._swept < 1:
+            return
+        self._swept = now
+        for who, group in list(self._entries.items()):
+            for key, entry in list(group.items()):
+                if entry.last < now - self.memory:
+                    del group[key]
+                    self._drop(entry)
+            if not group:
+                del self._entries[who]
 
     def _find(self, code: str, who: str, subject: str) -> "_Entry | None":
         group = self._entries.get(who)
@@ -218,6 +242,8 @@ class Findings:
 
     def _place(self, code: str, who: str, subject: str, now: float) -> "_Entry":
         """A new entry, or the one that counts for everything of this code that did not fit."""
+        if self._size >= self.capacity:
+            self._make_room(now)
         if self._size < self.capacity:
             self._size += 1
             entry = _Entry(code, who, subject, now)

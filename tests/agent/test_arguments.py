@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from muros.agent import Limits
 from muros.agent._options import OPTIONS, TRANSPORTS
 from muros.agent.arguments import AgentOptions, LinkOptions, UsageError, help_text, parse_arguments
 
@@ -86,8 +87,8 @@ def test_links(line: str, expected: LinkOptions) -> None:
         ("udp4 -p 1 --no-color", "color", False),
         ("udp4 -p 1", "color", None),
         ("udp4 -p 1 --log-style reference", "log_style", "reference"),
-        ("udp4 -p 1 --forget 30", "forget", 30.0),
-        ("udp4 -p 1", "forget", None),
+        ("udp4 -p 1 --forget 30", "limits", Limits(forget_silent=30_000)),
+        ("udp4 -p 1", "limits", Limits()),
         ("udp4 -p 1", "domain_override", None),
         ("udp4 -p 1 -d", "discovery_port", 7400),
         ("udp4 -p 1", "discovery_port", None),
@@ -262,6 +263,10 @@ baudrate = 921600
 kind = "canfd"
 device = "can0"
 id = 0x10
+
+[limits]
+max_clients = 20
+stop-at-failure = true
 """
 
 
@@ -283,7 +288,7 @@ def test_a_configuration_file(tmp_path: Path) -> None:
         refs=tmp_path / "profiles/agent.refs",
         verbose=5,
         color=False,
-        forget=30.0,
+        limits=Limits(forget_silent=30_000, max_clients=20, stop_at_failure=True),
     )
 
 

@@ -165,7 +165,8 @@ def test_discovery_hears_the_interface_of_the_link() -> None:
     for bind, interface in (("127.0.0.1", "127.0.0.1"), ("0.0.0.0", None)):
         options = parse_arguments(["udp4", "-p", "1", "-d", "--bind", bind], {})
         assert options is not None
-        _, discovery = make_links(options)
+        (link, _), (discovery, announced) = make_links(options)
+        assert announced == [link]
         assert isinstance(discovery, DiscoveryLink)
         assert discovery.interface == interface
 
@@ -186,7 +187,7 @@ def test_discovery_hears_the_interface_of_the_link() -> None:
 def test_links_are_made_as_asked_for(line: str, names: list[str] | None) -> None:
     options = parse_arguments(shlex.split(line), {})
     assert options is not None
-    made = [link.name for link in make_links(options)]
+    made = [link.name for link, _ in make_links(options)]
     if names is None:
         # One discovery port is opened once, however many links ask for it.
         assert [name.rpartition(":")[2] for name in made] == ["1", "2", "3", "7400", "7500"]

@@ -9,7 +9,8 @@ await agent.run()
 
 import asyncio
 import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Collection, Hashable
+from dataclasses import replace
 from typing import Any
 
 from muros.agent._core import AgentCore, Port
@@ -31,7 +32,7 @@ class Agent:
 
     ``space``: a URL (``"local:"``) or a space to share with others. ``references`` gives a meaning to what clients
     create by reference; the default is the convention of names. ``domain`` is meant by clients that ask for domain
-    255. ``limits`` are the fields of `Limits`.
+    255. ``limits`` are those of the agent; single ``fields`` of `Limits` may be given by name instead.
     """
 
     def __init__(
@@ -41,7 +42,8 @@ class Agent:
         references: References | None = None,
         findings: Findings | None = None,
         domain: int = 0,
-        **limits: Any,
+        limits: Limits | None = None,
+        **fields: Any,
     ) -> None:
         if isinstance(space, str):
             self.findings = findings or Findings()
@@ -55,7 +57,7 @@ class Agent:
             self.space,
             references or NamedReferences(),
             self.findings,
-            limits=Limits(**limits),
+            limits=replace(limits or Limits(), **fields),
             wall=time.time_ns,
             default_domain=domain,
         )
@@ -68,10 +70,14 @@ class Agent:
         self._timer: asyncio.TimerHandle | None = None
         self._timer_at = 0
         self._closed: asyncio.Event | None = None
+        self._ended = False
 
-    def add_link(self, link: Link) -> Link:
-        """Adds a link; it opens when the agent runs, or now if it does. Raises LinkError if it cannot open then."""
-        adapter = _LinkAdapter(self, link)
+    def add_link(self, link: Link, *, announces: Collection[Link] | None = None) -> Link:
+        """Adds a link; it opens when the agent runs, or now if it does. Raises LinkError if it cannot open then.
+
+        ``announces``: the links that a discovery link tells of; None: all that have a place in the network.
+        """
+        adapter = _LinkAdapter(self, link, announces)
         if self._loop is not None:
             try:
                 link.open(adapter)
@@ -99,7 +105,14 @@ class Agent:
         return self.findings.on_finding(callback)
 
     async def start(self) -> None:
-        """Opens the links and serves in the background. Raises LinkError; no link is open then."""
+        """Opens the links and serves in the background. Raises LinkError; no link is open then, and one may try again.
+
+        Raises RuntimeError for an agent that serves already or was closed: make a new one.
+        """
+        if self._loop is not None or self._ended:
+            raise RuntimeError(
+                "this agent was closed: make a new one" if self._ended else "this agent runs already"
+            )
         self._loop = asyncio.get_running_loop()
         self._closed = asyncio.Event()
         self.space.on_wake(lambda: self._arm(_now()))
@@ -107,7 +120,7 @@ class Agent:
             for link in self.links:
                 link.open(self._adapters[link])
         except BaseException:
-            self.close()
+            self._stop()
             raise
         self._arm(_now())
 
@@ -121,36 +134,49 @@ class Agent:
             self.close()
 
     def close(self) -> None:
-        """Closes every link and removes every client. Closing twice is harmless."""
-        if self._loop is None:
+        """Closes every link and removes every client, for good. Closing twice is harmless."""
+        if self._ended:
             return
+        self._ended = True
+        self._stop()
+        for session in list(self.core.clients.values()):
+            self.core.remove(session, "the agent stops")
+        self.findings.flush()
+        if self._owns_space:
+            self.space.close()
+        if self._closed is not None:
+            self._closed.set()
+
+    def _stop(self) -> None:
         self._loop = None
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
         for link in self.links:
             link.close()
-        for session in list(self.core.clients.values()):
-            self.core.remove(session, "the agent stops")
-        self.findings.flush()
         self.space.on_wake(None)
-        if self._owns_space:
-            self.space.close()
-        if self._closed is not None:
-            self._closed.set()
 
-    def locators(self, discovery: Link) -> list[Locator]:
-        """Where clients that ask on the link ``discovery`` are told to find the agent."""
+    def locators(self, announced: Collection[Link] | None = None) -> list[Locator]:
+        """Where clients that ask for an agent are told to find it: at the ``announced`` links, None for all."""
         return [
             Locator(locator.packed, locator.port)
             for link in self.links
-            if not link.discovery_only
+            if not link.discovery_only and (announced is None or link in announced)
             for locator in link.locators()
         ]
 
     def _tell(self, event: Event) -> None:
         for callback in list(self._watchers):
-            callback(event)
+            try:
+                callback(event)
+            except Exception as error:  # whoever watches must not harm those who are watched
+                self.core.report(
+                    "watcher-failed",
+                    who=getattr(callback, "__qualname__", repr(callback)),
+                    what="{n} event{s} not taken by a watcher of the agent",
+                    why=f"it raised {type(error).__name__}: {error}",
+                    remedy="Mend the callback given to on_event.",
+                )
 
     def _arm(self, tick: int) -> None:
         """Sees to a call of `_tick` at ``tick`` (ms) at the latest."""
@@ -182,12 +208,12 @@ class Agent:
 class _LinkAdapter:
     """What one link tells the agent: the events of a link, turned into calls of the core."""
 
-    def __init__(self, agent: Agent, link: Link) -> None:
+    def __init__(self, agent: Agent, link: Link, announces: Collection[Link] | None) -> None:
         self._agent = agent
         self.port: Port = agent.core.attach(
             link,
             discovery_only=link.discovery_only,
-            locators=(lambda: agent.locators(link)) if link.discovery_only else None,
+            locators=(lambda: agent.locators(announces)) if link.discovery_only else None,
         )
 
     def on_message(self, link: Link, data: bytes, address: Hashable) -> None:

@@ -24,7 +24,15 @@ from muros.agent._messages import (
 )
 from muros.agent._proxies import ParticipantProxy
 from muros.agent._session import AgentSession
-from muros.agent.events import ClientBack, ClientConnected, ClientGone, ClientLost, ClientReady, Event
+from muros.agent.events import (
+    ClientBack,
+    ClientConnected,
+    ClientGone,
+    ClientLost,
+    ClientReady,
+    ClientSilent,
+    Event,
+)
 from muros.agent.profiles import References
 from muros.findings import Findings
 from muros.space import Space
@@ -62,6 +70,8 @@ _TICK = 50
 _DEAD_TICK = 1_000
 """When to look again for clients that have fallen silent and are owed HEARTBEATs, in ms."""
 _LIVELINESS_TICK = 200
+_TWINS = 3
+"""How often a living client may change its address until two devices are suspected."""
 _SUMMARY = 1_000
 """When to look whether findings are to be summarised, in ms after one."""
 _QUIET = 200
@@ -108,10 +118,10 @@ class Port:
             and data[0] == session.head[0]
             and (data[0] >= 0x80 or data[4:8] == session.key)
         ):
+            if session.told_silent or session.lost_at is not None:
+                core.found_again(session)
             session.heard = now
             session.probes = 0
-            if session.lost_at is not None:
-                core.found_again(session)
             session.receive(data, 0, len(data), now)
             return
         core.receive_elsewhere(self, data, address, session)
@@ -150,6 +160,7 @@ class AgentCore:
         self._watched: dict[AgentSession, None] = {}
         self._calls = Calls()
         self._attempts: dict[tuple[bytes, str], int] = {}
+        self.joining = 0
         self._heartbeat_at = 0
         self._liveliness_at = 0
         self._silence_at = 0
@@ -255,7 +266,11 @@ class AgentCore:
         awaited = False
         dead = self.limits.dead_time
         for session in list(self.unacknowledged):
-            if now - session.heard > dead or session.lost_at is not None:
+            silence = now - session.heard
+            if silence > self.limits.silent and not session.told_silent and session.lost_at is None:
+                session.told_silent = True
+                self.tell(ClientSilent(session.number, silence / 1000))
+            if silence > dead or session.lost_at is not None:
                 continue
             session.heartbeats(now)
             if all(stream_id < 0x80 or stream.idle() for stream_id, stream in session.outputs.items()):
@@ -315,8 +330,6 @@ class AgentCore:
             del session.port.sessions[session.address]
         self._fresh.pop(session, None)
         self._watched.pop(session, None)
-        if session.attempt:
-            self._remember(session)
         session.close()
         self.findings.forget(session.who)
         self.tell(ClientGone(session.number, session.head[0], reason))
@@ -333,15 +346,18 @@ class AgentCore:
     def logout(self, session: AgentSession, ids: bytes) -> None:
         """The client says goodbye."""
         session.answer_control(status(ids, STATUS_OK))
+        if session.attempt:
+            self._remember(session)
         self.remove(session, "it said goodbye")
 
     def found_again(self, session: AgentSession) -> None:
         """A client that was lost is heard on the way it had: it goes on where it was."""
-        lost_at = session.lost_at
+        lost_at = session.heard if session.lost_at is None else session.lost_at
+        session.told_silent = False
         session.found()
         if session.outputs:
             self.has_unacknowledged(session)
-        away = (self.now - (lost_at or self.now)) / 1000
+        away = (self.now - lost_at) / 1000
         self.tell(
             ClientBack(
                 session.number, session.head[0], session.port.link.describe(session.address), away, False
@@ -475,12 +491,34 @@ class AgentCore:
         self, session: AgentSession, port: Port, address: Hashable, asked: CreateClient, attempt: str
     ) -> None:
         away = (self.now - (session.heard if session.lost_at is None else session.lost_at)) / 1000
+        self._see_twins(session, port, address)
         session.attempt = attempt
+        session.told_silent = False
         session.here()
         self._rebind(session, port, address)
         self._configure(session, asked)
         session.restart()
         self.tell(ClientBack(session.number, asked.session_id, port.link.describe(address), away, True))
+
+    def _see_twins(self, session: AgentSession, port: Port, address: Hashable) -> None:
+        """Two devices with one client key take the session from each other again and again."""
+        if (
+            port is session.port
+            and address == session.address
+            or self.now - session.heard > self.limits.silent
+        ):
+            session.moves = 0
+            return
+        session.moves += 1
+        if session.moves >= _TWINS:
+            self.report(
+                "client-key-in-use-twice",
+                who=session.who,
+                what=f"{session.who} changes its address again and again",
+                why=f"it was alive at {session.port.link.describe(session.address)} when it connected from "
+                f"{port.link.describe(address)}: two devices seem to use one client key",
+                remedy="Give each device a client key of its own.",
+            )
 
     def _configure(self, session: AgentSession, asked: CreateClient) -> None:
         session.mtu = max(asked.mtu, len(session.head) + 12)
@@ -497,7 +535,7 @@ class AgentCore:
     def _move(self, session: AgentSession, port: Port, address: Hashable) -> None:
         if session.port is not port or session.address != address:
             self._rebind(session, port, address)
-        if session.lost_at is not None:
+        if session.told_silent or session.lost_at is not None:
             self.found_again(session)
 
     def _rebind(self, session: AgentSession, port: Port, address: Hashable) -> None:
@@ -505,7 +543,11 @@ class AgentCore:
             del session.port.sessions[session.address]
         session.port = port
         session.address = address
-        port.sessions[address] = session
+        neighbour = port.sessions.get(address)
+        if (
+            neighbour is None or neighbour.head[0] < 0x80
+        ):  # who has no key in its headers is found by address alone
+            port.sessions[address] = session
 
     # Answers
 

@@ -1,5 +1,6 @@
 """From what a client describes to a proxy in the data space: parents, topics and QoS are resolved here."""
 
+from muros.agent._limits import Limits
 from muros.agent._proxies import (
     GroupProxy,
     ParticipantProxy,
@@ -118,7 +119,7 @@ def build(
     client: str,
     client_key: bytes,
     default_domain: int,
-    outstanding: int,
+    limits: Limits,
 ) -> Proxy:
     """The proxy for ``entity``, in the space. Raises Refused."""
     try:
@@ -151,12 +152,15 @@ def build(
             return ReaderProxy(object_id, entity, participant, topic, _qos(entity.effective_qos, entity))
         if isinstance(entity, RequesterEntity):
             return RequesterProxy(
-                object_id, entity, participant, _service(entity), Qos.preset("services_default"), outstanding
+                object_id,
+                entity,
+                participant,
+                _service(entity),
+                _services(limits),
+                limits.outstanding_requests,
             )
         if isinstance(entity, ReplierEntity):
-            return ReplierProxy(
-                object_id, entity, participant, _service(entity), Qos.preset("services_default")
-            )
+            return ReplierProxy(object_id, entity, participant, _service(entity), _services(limits))
     except (SpaceError, ValueError) as error:
         raise Refused(STATUS_ERR_DDS_ERROR, str(error)) from None
     raise Refused(STATUS_ERR_INVALID_DATA, "its representation describes nothing")
@@ -220,6 +224,10 @@ def _service(entity: RequesterEntity | ReplierEntity) -> Service:
         entity.request_type,
         entity.reply_type,
     )
+
+
+def _services(limits: Limits) -> Qos:
+    return Qos.preset("services_default").replace(depth=limits.request_history)
 
 
 def _qos(qos: EndpointQos, entity: DataWriterEntity | DataReaderEntity) -> Qos:

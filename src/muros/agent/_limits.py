@@ -32,6 +32,8 @@ class Limits:
     """Unanswered probes after which a client with hard liveliness is removed."""
     keep_lost: int | None = 30_000
     """How long a client whose connection or cable is gone is kept; None: until it says goodbye."""
+    silent: int = 3_000
+    """Silence, while it owes an acknowledgement, after which a client is said to be silent."""
     forget_silent: int | None = None
     """How long a silent client is kept; None: for ever, as the reference agent does."""
     max_clients: int = 10_000
@@ -41,9 +43,11 @@ class Limits:
     """Input streams of one client, without stream 0."""
     max_sample: int = 1 << 22
     """Longest sample from a client, joined from its fragments."""
+    max_joining: int = 1 << 26
+    """Bytes in samples of all clients that are being joined."""
     max_sample_to_client: int = 65_527
-    """Longest sample to a client. Beyond 65527 bytes the length field of DATA is too short; it is sent as 0 then, which
-    foreign clients may not understand."""
+    """Longest sample to a foreign client; one of muros takes up to ``max_sample``. Beyond 65527 bytes the length field
+    of DATA is too short; it is sent as 0 then, which not every client may understand."""
     request_history: int = 16
     """Requests and replies kept for a client that does not read them yet."""
     max_waiting: int = 16_384

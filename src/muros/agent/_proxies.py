@@ -18,7 +18,6 @@ from muros.xrce.constants import (
     KIND_PUBLISHER,
     KIND_REPLIER,
     KIND_REQUESTER,
-    KIND_SUBSCRIBER,
     KIND_TOPIC,
     UNLIMITED_SAMPLES,
 )
@@ -344,7 +343,7 @@ class ReaderProxy(_Readable):
 class RequesterProxy(_Readable):
     """A client of a service: its requests carry the ids of their WRITE_DATA, which the replies bring back."""
 
-    __slots__ = ("_limit", "_outstanding", "requester")
+    __slots__ = ("_answered", "_limit", "_outstanding", "_sending", "requester")
     kind = KIND_REQUESTER
 
     def __init__(
@@ -354,6 +353,7 @@ class RequesterProxy(_Readable):
         super().__init__(object_id, entity, parent, topic, f"calls {service.name}")
         self._outstanding: dict[int, bytes] = {}
         self._limit = limit
+        self._sending = self._answered = False
         try:
             self.requester: Requester = parent.participant.requester(
                 service, qos, on_data=self._on_data, key=object_id
@@ -367,8 +367,21 @@ class RequesterProxy(_Readable):
         room = len(self._outstanding) < self._limit
         if not room:
             del self._outstanding[next(iter(self._outstanding))]
-        self._outstanding[self.requester.send(body)] = ids
+        self._sending, self._answered = True, False
+        try:
+            number = self.requester.send(body)
+        finally:
+            self._sending = False
+        self._outstanding[number] = ids
+        if self._answered and self.reading is not None:
+            self.reading.pump()
         return room
+
+    def _on_data(self, source: object) -> None:
+        if self._sending:  # a server in this process answers at once, before we know the request's number
+            self._answered = True
+        else:
+            super()._on_data(source)
 
     def take(self) -> bytes | None:
         """The next reply behind the ids of its request; replies to requests given up are passed over."""
@@ -414,7 +427,3 @@ class ReplierProxy(_Readable):
         """Takes it out of the space."""
         self.replier.close()
         super().close()
-
-
-READABLE_KINDS = (KIND_DATAREADER, KIND_REQUESTER, KIND_REPLIER)
-GROUP_KINDS = (KIND_PUBLISHER, KIND_SUBSCRIBER)

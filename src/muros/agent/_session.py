@@ -43,6 +43,7 @@ from muros.xrce.constants import (
     STREAM_RELIABLE,
     WRITE_DATA,
 )
+from muros.xrce.fragments import Joiner
 from muros.xrce.inputs import BestEffortInput
 from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableInput, QueuedReliableOutput
 from muros.xrce.representation import InvalidRepresentation, Kind, parse_variant_untrusted
@@ -78,6 +79,9 @@ class AgentSession(SessionCore):
         self.closed = False
         self.objects: dict[int, Proxy] = {}
         self.created_at = 0
+        self.joining = 0  # bytes in samples that are being joined
+        self.moves = 0  # how often it was taken over from an address where it was alive
+        self.told_silent = False
         self.stop_at_failure = core.limits.stop_at_failure
         self._waiting: list[Reading] = []
 
@@ -95,11 +99,17 @@ class AgentSession(SessionCore):
 
     @property
     def max_sample(self) -> int:
-        """Longest sample sent to the client, in bytes."""
-        return self.core.limits.max_sample_to_client
+        """Longest sample sent to the client, in bytes; a muros client takes as much as we take from it."""
+        limits = self.core.limits
+        return (
+            max(limits.max_sample, limits.max_sample_to_client)
+            if self.attempt
+            else limits.max_sample_to_client
+        )
 
     def restart(self) -> None:
         """The client began again: all streams at 0, what waited for it is dropped, entities and readings stay."""
+        self._joins(0)
         self.reset()
         for stream_id in self.outputs:
             self.outputs[stream_id].mtu = self.mtu
@@ -121,6 +131,7 @@ class AgentSession(SessionCore):
         """Takes everything of the client out of the space. A message that is being handled has no further effect."""
         self.closed = True
         self.here()
+        self._joins(0)
         self.reset()
         objects, self.objects = self.objects, {}
         for proxy in reversed(list(objects.values())):
@@ -183,7 +194,7 @@ class AgentSession(SessionCore):
                 subject=reading.subject,
                 what=f"{{n}} sample{{s}} of {reading.subject} to {self.who} dropped",
                 why=f"{n} B are more than the {self.max_sample} B the agent sends to a client",
-                remedy="Raise max_sample_to_client, or send smaller samples.",
+                remedy="Send smaller samples, or set limits.max_sample_to_client if this client can take longer ones.",
             )
             return
         self.core.report(
@@ -215,6 +226,33 @@ class AgentSession(SessionCore):
             stream = BestEffortInput(stream_id)
         self.inputs[stream_id] = stream
         return stream
+
+    def _on_fragment(self, stream: Any, buf: Buffer, at: int, n: int, last: int) -> bool:
+        """Takes a piece, as long as what all clients have under way stays within the limit."""
+        core = self.core
+        if core.joining + n > core.limits.max_joining and (
+            stream.fragments is None or not stream.fragments.torn
+        ):
+            if stream.fragments is None:
+                stream.fragments = Joiner(self.largest)
+            stream.fragments.clear()
+            stream.fragments.torn = True
+            core.report(
+                "too-much-joining",
+                who=self.who,
+                what=f"{{n}} sample{{s}} of {self.who} dropped",
+                why=f"samples that come in pieces make {core.joining} B of {core.limits.max_joining} B",
+                remedy="Find the client that begins samples and does not end them, or raise limits.max_joining.",
+            )
+        held = super()._on_fragment(stream, buf, at, n, last)
+        self._joins(
+            sum(len(s.fragments.data) for s in self.inputs.values() if s.reliable and s.fragments is not None)
+        )
+        return held
+
+    def _joins(self, n: int) -> None:
+        self.core.joining += n - self.joining
+        self.joining = n
 
     def too_long(self, stream_id: int, n: int) -> None:
         """A joined submessage was longer than the limit."""
@@ -338,7 +376,7 @@ class AgentSession(SessionCore):
                 client=self.who,
                 client_key=self.key,
                 default_domain=self.core.default_domain,
-                outstanding=self.core.limits.outstanding_requests,
+                limits=self.core.limits,
             )
         except Refused as refused:
             return self._refused(object_id, refused)

@@ -12,10 +12,11 @@ import ipaddress
 import os
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Final
 
+from muros.agent._limits import Limits
 from muros.agent._options import (
     BAUDRATE,
     BY_FLAG,
@@ -78,8 +79,8 @@ class AgentOptions:
     color: bool | None = None
     """None: if the output is a terminal."""
     log_style: str = "muros"
-    forget: float | None = None
-    """Seconds after which a silent client is removed; None: never."""
+    limits: Limits = Limits()
+    """The limits of the agent, with what was said about them."""
     domain_override: int | None = None
     """The domain of clients that ask for domain 255; None: 255 is a domain like others."""
     notes: tuple[str, ...] = ()
@@ -163,6 +164,7 @@ class _Given:
 
     links: list[_Place] = field(default_factory=list)
     agent: dict[str, Value] = field(default_factory=dict)
+    limits: Limits = Limits()
 
 
 def _read_words(words: list[str], given: _Given) -> None:
@@ -260,7 +262,7 @@ def _options(given: _Given, environ: Mapping[str, str]) -> AgentOptions:
         verbose=agent.get("verbose", VERBOSE),
         color=False if agent.get("no-color") else None,
         log_style=agent.get("log-style", "muros"),
-        forget=agent.get("forget"),
+        limits=_limits(given),
         domain_override=_domain_override(environ),
         notes=tuple(
             f"{place.said[key]} has no effect: {why}"
@@ -329,6 +331,9 @@ def _read_config(path: Path, given: _Given) -> None:
         raise UsageError(f"{path}: not UTF-8") from None
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path}: not TOML: {error}") from None
+    except RecursionError:
+        raise UsageError(f"{path}: nested too deeply") from None
+    given.limits = _read_limits(document.pop("limits", {}), path, text)
     links: list[_Place] = []
     tables = document.pop("link", [])
     if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
@@ -336,7 +341,7 @@ def _read_config(path: Path, given: _Given) -> None:
     for number, table in enumerate(tables):
         kind = table.pop("kind", None)
         said = _said(path, text, number, "kind")
-        if kind not in TRANSPORTS:
+        if not isinstance(kind, str) or kind not in TRANSPORTS:
             what = "missing" if kind is None else f"{kind!r}{guess(str(kind), list(TRANSPORTS))}"
             raise UsageError(f"{said}: {what}; there are {', '.join(TRANSPORTS)}")
         place = _Place(kind, where=f"{path}: link {number + 1}, {kind}: ")
@@ -354,6 +359,35 @@ def _read_config(path: Path, given: _Given) -> None:
         if option.key not in given.agent:
             read = _config_value(option, value, said)
             given.agent[option.key] = path.parent / str(read) if option.key == "refs" else read
+
+
+def _read_limits(table: object, path: Path, text: str) -> Limits:
+    """The table [limits] of a configuration file: fields of `Limits` by name."""
+    if not isinstance(table, dict):
+        raise UsageError(f"{_said(path, text, -1, 'limits')}: write limits as a [limits] table")
+    known = {each.name: each for each in fields(Limits)}
+    read: dict[str, Any] = {}
+    for key, value in table.items():
+        name = key.replace("-", "_")
+        said = f"{path}: [limits] {key}"
+        if name not in known:
+            raise UsageError(f"{said}: unknown limit{guess(name, list(known))}; there are {', '.join(known)}")
+        if not isinstance(value, bool if isinstance(known[name].default, bool) else int):
+            raise UsageError(
+                f"{said}: {'true or false' if isinstance(known[name].default, bool) else 'a number'} is needed"
+            )
+        read[name] = value
+    try:
+        return Limits(**read)
+    except ValueError as error:
+        raise UsageError(f"{path}: [limits] {error}") from None
+
+
+def _limits(given: _Given) -> Limits:
+    forget = given.agent.get("forget")
+    if forget is None:
+        return given.limits
+    return replace(given.limits, forget_silent=round(float(str(forget)) * 1000))
 
 
 def _config_option(key: str, said: str, belongs: Callable[[Option], bool]) -> Option:

@@ -13,6 +13,7 @@ __all__ = [
     "ClientGone",
     "ClientLost",
     "ClientReady",
+    "ClientSilent",
     "EntityCreated",
     "EntityDeleted",
     "Event",
@@ -129,6 +130,18 @@ class ClientLost(Event):
         """One line for people."""
         kept = "kept until it is back" if self.kept is None else f"kept for {self.kept:.0f} s"
         return f"{client_name(self.key)} lost ({self.reason}), {kept}"
+
+
+@dataclass(frozen=True, slots=True)
+class ClientSilent(Event):
+    """A client owes acknowledgements and has not been heard for so many seconds; samples for it pile up."""
+
+    key: int
+    silence: float
+
+    def text(self) -> str:
+        """One line for people."""
+        return f"{client_name(self.key)} silent for {self.silence:.0f} s: what it reads is not acknowledged"
 
 
 @dataclass(frozen=True, slots=True)

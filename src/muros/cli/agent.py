@@ -46,15 +46,18 @@ def run(argv: Sequence[str]) -> int:
     return 0
 
 
-def make_links(options: AgentOptions) -> Iterator[Link]:
-    """The links that are asked for, closed; one discovery link for each port that is asked for."""
-    discovery: dict[int, Link] = {}
-    for link in options.links:
-        yield _make_link(link)
-        port = link.discovery_port
-        if port is not None and port not in discovery:
-            one = link.bind if link.bind and link.family == 4 and link.bind != "0.0.0.0" else None
-            discovery[port] = DiscoveryLink(port, interface=one)
+def make_links(options: AgentOptions) -> Iterator[tuple[Link, list[Link] | None]]:
+    """The links that are asked for, closed; and one discovery link for each port, with the links it announces."""
+    discovery: dict[int, tuple[Link, list[Link]]] = {}
+    for asked in options.links:
+        link = _make_link(asked)
+        yield link, None
+        port = asked.discovery_port
+        if port is not None:
+            if port not in discovery:
+                one = asked.bind if asked.bind and asked.family == 4 and asked.bind != "0.0.0.0" else None
+                discovery[port] = DiscoveryLink(port, interface=one), []
+            discovery[port][1].append(link)
     yield from discovery.values()
 
 
@@ -76,15 +79,19 @@ async def _serve(options: AgentOptions, profiles: Profiles) -> None:
         options.space,
         references=ReferenceChain(profiles, NamedReferences()),
         domain=options.domain_override or 0,
-        forget_silent=None if options.forget is None else round(options.forget * 1000),
+        limits=options.limits,
     )
 
     def on_message(link: Link, incoming: bool, data: bytes, address: Address) -> None:
         log.message(Message(link.name, link.describe(address), incoming, data))
 
-    links = list(make_links(options))
-    for link in links:
-        agent.add_link(Tap(link, on_message) if options.verbose >= DEBUG else link)
+    added: dict[Link, Link] = {}
+    for link, announced in make_links(options):
+        added[link] = Tap(link, on_message) if options.verbose >= DEBUG else link
+        agent.add_link(
+            added[link], announces=None if announced is None else [added[each] for each in announced]
+        )
+    links = list(added)
     early: list[Event | Finding] = []
     unwatch = agent.on_event(early.append), agent.on_finding(early.append)
     stop = asyncio.Event()

@@ -58,7 +58,8 @@ class TopicRecord:
 
 def reasons_against(writer: LocalWriter, reader: LocalReader) -> tuple[Mismatch, ...]:
     """Why the two do not fit; empty if they do."""
-    if writer.topic.type_name != reader.topic.type_name:
+    types = (writer.topic.type_name, reader.topic.type_name)
+    if types[0] != types[1] and all(types):  # who was made by a name alone says no type and meets any
         return (
             Mismatch(
                 "type",
