@@ -42,6 +42,11 @@ class Node:
     def now(self) -> int:
         return int(self.network.now)
 
+    @property
+    def cores(self) -> list[WriterCore | ReaderCore]:
+        """Its writers and readers."""
+        return [*self.writers.values(), *self.readers.values()]
+
     def writer(self, entity: int = WRITER, **options: Any) -> WriterCore:
         """A new writer."""
         made = self.writers[entity] = WriterCore(
@@ -75,8 +80,7 @@ class Node:
     def act(self, _now: float) -> float | None:
         """What is due, as an actor of `SimulatedNetwork.run`."""
         deadlines = []
-        cores: list[WriterCore | ReaderCore] = [*self.writers.values(), *self.readers.values()]
-        for core in cores:
+        for core in self.cores:
             if core.deadline is not None and core.deadline <= self.now:
                 core.tick(self.now)
             if core.deadline is not None:
