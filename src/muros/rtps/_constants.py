@@ -23,6 +23,7 @@ __all__ = [
     "Submessage",
     "entity_kind",
     "is_builtin",
+    "is_reader",
     "is_writer",
     "keyed",
     "vendor_name",
@@ -121,6 +122,7 @@ class EntityKind(IntEnum):
 
 
 _WRITERS: Final = (EntityKind.WRITER, EntityKind.WRITER_KEYED)
+_READERS: Final = (EntityKind.READER, EntityKind.READER_KEYED)
 _KEYED: Final = (EntityKind.WRITER_KEYED, EntityKind.READER_KEYED)
 _BUILTIN_BITS: Final = 0xC0
 
@@ -138,6 +140,11 @@ def is_builtin(entity: EntityId) -> bool:
 def is_writer(entity: EntityId) -> bool:
     """Whether this is a writer's id."""
     return entity & 0x3F in _WRITERS
+
+
+def is_reader(entity: EntityId) -> bool:
+    """Whether this is a reader's id."""
+    return entity & 0x3F in _READERS
 
 
 def keyed(entity: EntityId) -> bool:
@@ -288,6 +295,7 @@ class Pid(IntEnum):
     TYPE_INFORMATION = 0x0075
     BUILTIN_ENDPOINT_QOS = 0x0077
     RELATED_SAMPLE_IDENTITY = 0x0083
+    DOMAIN_TAG = 0x4014
     VENDOR_RELATED_SAMPLE_IDENTITY = 0x800F
     """Fast DDS's own number for the same, from before there was a standard one."""
 

@@ -247,7 +247,7 @@ class ParameterBuilder:
         self.add(pid, struct.pack(self.order + "iI16s", *locator))
 
     def _text(self, text: str) -> bytes:
-        octets = text.encode("utf-8", "surrogateescape") + b"\0"
+        octets = text.encode() + b"\0"
         return struct.pack(self.order + "I", len(octets)) + octets.ljust(len(octets) + 3 & ~3, b"\0")
 
 
