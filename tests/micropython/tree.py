@@ -24,6 +24,7 @@ HOST_ONLY = frozenset(
         "muros/xrce/_crc.py",
         "muros/xrce/_types.py",
         "muros/xrce/constants.py",
+        "muros/xrce/entities.py",
         "muros/xrce/framing.py",
         "muros/xrce/queues.py",
         "muros/xrce/representation.py",

@@ -14,6 +14,7 @@ module                runs on    holds
 ``fragments``         both       joining and cutting samples that are larger than a message
 ``session``           both       a session: headers, streams, acknowledgements; either role
 ``create``            both       CREATE and READ_DATA payloads, as a client writes them
+``entities``          hosts      what a client asks for, as values
 ``representation``    hosts      the same payloads, as an agent reads them from foreign bytes
 ``serial``            both       frames of serial lines, with escaping and CRC-16/ARC
 ``framing``           hosts      the frames of every stream-like link: serial, TCP, CAN FD
