@@ -288,3 +288,12 @@ def test_every_occurrence_is_told_once(steps: list[tuple[str, str, int]]) -> Non
         assert len(findings.snapshot()) <= 5
     findings.flush()
     assert sum(f.new for f in told) == total
+
+
+def test_old_findings_make_room_for_new_ones() -> None:
+    findings = Findings(capacity=2, memory=60.0)
+    findings.report("old", who="a", what="x", now=0.0)
+    findings.report("fresh", who="b", what="x", now=50.0)
+    findings.report("new", who="c", what="x", why="y", now=70.0)
+    assert [finding.who for finding in findings.snapshot()] == ["b", "c"]
+    assert findings.counts() == {"old": 1, "fresh": 1, "new": 1}
