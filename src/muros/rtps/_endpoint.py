@@ -27,10 +27,13 @@ Place: TypeAlias = Hashable
 
 
 class Send(Protocol):
-    """Takes one datagram's submessages. Must not raise; what cannot be sent is lost, as on any network."""
+    """Takes one datagram's submessages. Must not raise or call a core; what cannot be sent is lost, as on any network.
+
+    Submessages of several calls may share a message: each call brings the INFO_TS it needs.
+    """
 
     def __call__(self, submessages: list[bytes], destination: GuidPrefix | None, place: Place, /) -> object:
-        """`destination`: the participant meant, None for whoever listens there. The list is the callee's own."""
+        """`destination`: the participant meant, None for whoever listens there. The list must not be changed."""
 
 
 class Problem(Enum):

@@ -310,13 +310,12 @@ class ReaderCore:
             elif number < proxy.floor:
                 proxy.expected = number + 1 if pending else proxy.floor
                 lost += proxy.expected - number
+                lost -= sum(number < n < proxy.expected for n in irrelevant)
             else:
                 break
         expected = proxy.expected
         if irrelevant and not pending:
-            passed = {number for number in irrelevant if number < expected}
-            lost -= len(passed) if lost else 0
-            irrelevant -= passed
+            irrelevant -= {number for number in irrelevant if number < expected}
         for number in [number for number in proxy.assemblies if number < expected]:
             self._forget_assembly(proxy, number)
         if lost:

@@ -76,9 +76,9 @@ class WriterCore:
 
     __slots__ = (
         "_allowance", "_ask_at", "_ask_every", "_at", "_count", "_cursor", "_endpoint_qos", "_entity",
-        "_history", "_idle", "_lagging", "_lifespan", "_on_room", "_proxies", "_refused", "_reliable", "_repairing",
-        "_report", "_retains", "_routes", "_send", "_unasked", "_unsent", "_with_qos", "guid", "last", "reliable",
-        "sent", "settings",
+        "_history", "_idle", "_lagging", "_leaving", "_lifespan", "_on_room", "_proxies", "_refused",
+        "_reliable", "_repairing", "_report", "_retains", "_routes", "_send", "_unasked", "_unsent",
+        "_with_qos", "guid", "last", "reliable", "sent", "settings",
     )  # fmt: skip
 
     def __init__(
@@ -119,7 +119,8 @@ class WriterCore:
         self._repairing: dict[ReaderProxy, None] = {}  # those that want something again
         self._routes: tuple[Place, ...] = ()  # every place where a reader listens, once
         self._unsent: deque[int] = deque()  # samples waiting to leave
-        self._cursor = 0  # fragments of the first of them that have left
+        self._leaving: Sample | None = None  # the first of them, when part of it has left:
+        self._cursor = 0  # so many of its fragments
         self._allowance = Allowance(settings.burst, settings.pace)
         self._count = 0
         self._ask_at = 0
@@ -194,6 +195,7 @@ class WriterCore:
         self._reroute()
         if not self._routes:
             self._unsent.clear()
+            self._leaving = None
             self._cursor = 0
             self.sent = self.last
         self._release(now)
@@ -227,7 +229,7 @@ class WriterCore:
             raise ValueError(f"inline QoS of {len(qos)} bytes do not fit beside a fragment")
         sequence = self.last + 1
         sample = Sample(sequence, payload, stamp, qos, key, instance, last)
-        if self._reliable or self._retains or self._unsent or not whole:
+        if self._reliable or self._retains or self._unsent or (self._routes and not whole):
             if self._lifespan:
                 sample.expires = now + self._lifespan
                 self._at = min(self._at, sample.expires)
@@ -352,12 +354,15 @@ class WriterCore:
             return
         size = self.settings.fragment_size
         while unsent:
-            sample = self._history.get(unsent[0])
-            if sample is None:  # pushed out by newer ones
+            # One that has begun to leave is finished even when newer ones have pushed it out: else a writer that
+            # keeps one sample and is quicker than its allowance would never finish any.
+            sample = self._leaving or self._history.get(unsent[0])
+            if sample is None:
                 self.sent = unsent[0]
             elif len(sample.payload) + len(sample.inline_qos) <= size:
                 self._transmit(sample, now)
             else:
+                self._leaving = sample
                 total = fragments_of(len(sample.payload), size)
                 while self._cursor < total:
                     if not self._may_send(now):
@@ -372,6 +377,7 @@ class WriterCore:
                     self._allowance.spend(size * len(self._routes))
                     for place in self._routes:
                         self._send(submessages, None, place)
+            self._leaving = None
             self._cursor = 0
             unsent.popleft()
         if not self._lagging:
@@ -401,7 +407,7 @@ class WriterCore:
             for submessage in self._gaps(proxy, sorted(gone)):
                 packet.add(submessage)
             if not proxy.wanted:
-                del self._repairing[proxy]
+                self._repairing.pop(proxy, None)
                 packet.add(self._heartbeat(proxy, final=False))
             packet.flush()
         if self._repairing:
