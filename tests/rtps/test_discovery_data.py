@@ -28,12 +28,11 @@ from muros.rtps._discovery_data import (
     EndpointData,
     InvalidDiscoveryData,
     ParticipantData,
-    key_payload,
+    departure,
     key_untrusted,
     user_values,
 )
 from muros.rtps._parameters import ParameterBuilder, parse_untrusted, related_identity, status_info
-from muros.rtps._parameters import inline_qos as make_inline_qos
 from muros.rtps._qos import EndpointQos
 from muros.rtps._values import INFINITE, Locator, guid_of, udp4
 from muros.rtps._wire import Data
@@ -160,11 +159,18 @@ class TestOurs:
 
     @pytest.mark.parametrize("guid", [A + b"\0\0\1\xc1", A + b"\0\0\1\3", A + b"\0\0\1\4"])
     def test_keys(self, guid: bytes) -> None:
-        payload = key_payload(guid)
-        assert key_untrusted(payload, None) == guid
-        assert len(payload) == 4 + 20 + 4
-        hashed, _ = parse_untrusted(make_inline_qos(key_hash=guid, status=StatusInfo.DISPOSED))
+        hashed, _ = parse_untrusted(departure(guid))
+        assert status_info(hashed) == StatusInfo.DISPOSED | StatusInfo.UNREGISTERED
         assert key_untrusted(b"", hashed) == guid
+        pid = Pid.PARTICIPANT_GUID if guid.endswith(b"\xc1") else Pid.ENDPOINT_GUID
+        assert key_untrusted(_list((pid, guid)), None) == guid
+
+    def test_the_key_of_an_endpoint_that_names_its_participant_too(self) -> None:
+        guid = A + b"\0\0\1\3"
+        assert (
+            key_untrusted(_list((Pid.PARTICIPANT_GUID, A + b"\0\0\1\xc1"), (Pid.ENDPOINT_GUID, guid)), None)
+            == guid
+        )
 
 
 class TestRefused:

@@ -206,7 +206,7 @@ class TestForeign:
         ]
 
     def test_inline_qos_begin_where_the_offset_says(self) -> None:
-        """Later versions may put fields before them (9.4.5.3.3)."""
+        """Later versions may put fields before them (9.4.5.3)."""
         body = struct.pack("<HH", 0, 24) + struct.pack(">II", 1, 2) + struct.pack("<iI", 0, 1)
         (event,) = parse(sub(0x15, 0x05, body + b"later on" + b"pay!"))
         assert isinstance(event, wire.Data)

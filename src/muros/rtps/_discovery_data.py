@@ -5,7 +5,7 @@
 (8.4.13). Payloads are ours to write little endian, and theirs to send in either byte order. Ours tell neither
 TypeInformation nor TypeObject: peers that got it would compare types bit by bit, and refuse what they cannot.
 
-When one leaves, a DATA says so that holds only its key: `key_payload` writes it, `key_untrusted` reads it.
+When one leaves, a DATA says so that holds its key or the hash of it: `departure` and `key_untrusted`.
 """
 
 import struct
@@ -24,6 +24,7 @@ from muros.rtps._constants import (
     BuiltinEndpoint,
     Pid,
     Representation,
+    StatusInfo,
     is_reader,
     is_writer,
 )
@@ -36,7 +37,7 @@ __all__ = [
     "EndpointData",
     "InvalidDiscoveryData",
     "ParticipantData",
-    "key_payload",
+    "departure",
     "key_untrusted",
     "user_values",
 ]
@@ -254,12 +255,13 @@ class Assertion(NamedTuple):
         return cls(payload[4:16], kind == _MANUAL)
 
 
-def key_payload(guid: Guid) -> bytes:
-    """The payload of a DATA by which a participant or endpoint leaves: its GUID alone (9.6.2.2, 8.5.4)."""
-    builder = ParameterBuilder()
-    of_participant = split_guid(guid)[1] == ENTITYID_PARTICIPANT
-    builder.add(Pid.PARTICIPANT_GUID if of_participant else Pid.ENDPOINT_GUID, guid)
-    return _PL_CDR_LE + builder.build()
+def departure(guid: Guid) -> bytes:
+    """Inline QoS of the DATA, without payload, by which a participant or endpoint of ours leaves.
+
+    A key hash and not the key itself (9.6.3.8): both are allowed, but Fast DDS leaves alone what holds a key of
+    more than 16 bytes, and a parameter list does.
+    """
+    return _parameters.inline_qos(key_hash=guid, status=StatusInfo.DISPOSED | StatusInfo.UNREGISTERED)
 
 
 def key_untrusted(payload: bytes, inline_qos: Parameters | None) -> Guid:

@@ -126,7 +126,7 @@ class HeartbeatFrag(NamedTuple):
 
 
 class NackFrag(NamedTuple):
-    """Fragments of a sample that a reader misses (8.3.7.10)."""
+    """Fragments of a sample that a reader misses (8.3.7.11)."""
 
     source: GuidPrefix
     destination: GuidPrefix | None

@@ -170,7 +170,7 @@ class _Receiver:
         )
 
     def heartbeat(self, data: bytes, start: int, end: int, flags: int) -> None:
-        """HEARTBEAT (8.3.7.5, 9.4.5.7)."""
+        """HEARTBEAT (8.3.7.5, 9.4.5.6)."""
         if end - start < 28:
             raise _short("HEARTBEAT")
         first_high, first_low, last_high, last_low, count = _HEARTBEAT[flags & 1](data, start + 8)
@@ -194,7 +194,7 @@ class _Receiver:
         )
 
     def gap(self, data: bytes, start: int, end: int, flags: int) -> None:
-        """GAP (8.3.7.4, 9.4.5.6)."""
+        """GAP (8.3.7.4, 9.4.5.5)."""
         if end - start < 28:
             raise _short("GAP")
         order = flags & 1
@@ -224,7 +224,7 @@ class _Receiver:
         )
 
     def heartbeat_frag(self, data: bytes, start: int, end: int, flags: int) -> None:
-        """HEARTBEAT_FRAG (8.3.7.6, 9.4.5.8)."""
+        """HEARTBEAT_FRAG (8.3.7.6, 9.4.5.7)."""
         if end - start < 24:
             raise _short("HEARTBEAT_FRAG")
         order = flags & 1
@@ -238,7 +238,7 @@ class _Receiver:
         )
 
     def nack_frag(self, data: bytes, start: int, end: int, flags: int) -> None:
-        """NACK_FRAG (8.3.7.10, 9.4.5.13)."""
+        """NACK_FRAG (8.3.7.11, 9.4.5.13)."""
         if end - start < 28:
             raise _short("NACK_FRAG")
         order = flags & 1
@@ -256,7 +256,7 @@ class _Receiver:
         )
 
     def info_ts(self, data: bytes, start: int, end: int, flags: int) -> None:
-        """INFO_TS (8.3.7.9.6, 9.4.5.11)."""
+        """INFO_TS (8.3.7.10, 9.4.5.11)."""
         if flags & 0x02:
             self.time = None
         elif end - start < 8:
@@ -266,14 +266,14 @@ class _Receiver:
             self.time = time_from_wire(seconds, fraction)
 
     def info_dst(self, data: bytes, start: int, end: int, flags: int) -> None:
-        """INFO_DST (8.3.7.7, 9.4.5.9)."""
+        """INFO_DST (8.3.7.7, 9.4.5.8)."""
         if end - start < 12:
             raise _short("INFO_DST")
         prefix = data[start : start + 12]
         self.destination = None if prefix == _EVERYBODY else prefix
 
     def info_src(self, data: bytes, start: int, end: int, flags: int) -> None:
-        """INFO_SRC (8.3.7.9.5, 9.4.5.10)."""
+        """INFO_SRC (8.3.7.9, 9.4.5.10)."""
         if end - start < 20:
             raise _short("INFO_SRC")
         self.source = data[start + 8 : start + 20]

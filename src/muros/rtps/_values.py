@@ -34,11 +34,11 @@ INFINITE: Final = 2**63 - 1
 
 UDP4: Final = 1
 UDP6: Final = 2
-"""Kinds of locators (DDSI-RTPS 2.3, 9.3.2.3). Others, such as shared memory, are carried but not understood."""
+"""Kinds of locators (DDSI-RTPS 2.3, 9.3.2). Others, such as shared memory, are carried but not understood."""
 
 
 class Locator(NamedTuple):
-    """Where datagrams can be sent (DDSI-RTPS 2.3, 9.3.2.3)."""
+    """Where datagrams can be sent (DDSI-RTPS 2.3, 9.3.2)."""
 
     kind: int
     """`UDP4`, `UDP6`, or a vendor's own."""
@@ -82,7 +82,7 @@ def split_guid(guid: Guid) -> tuple[GuidPrefix, EntityId]:
     return guid[:PREFIX_SIZE], int.from_bytes(guid[PREFIX_SIZE:], "big")
 
 
-# Seconds and fractions of 1 / 2**32 s (DDSI-RTPS 2.3, 9.3.2.1). Both ways are rounded, not cut: a time in ns
+# Seconds and fractions of 1 / 2**32 s (DDSI-RTPS 2.3, 9.3.2). Both ways are rounded, not cut: a time in ns
 # then survives a round trip, for one ns is more than four fractions.
 
 _SECOND: Final = 10**9

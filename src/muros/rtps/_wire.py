@@ -165,7 +165,7 @@ def heartbeat(
     final: bool = False,
     liveliness: bool = False,
 ) -> bytes:
-    """HEARTBEAT (9.4.5.7). A writer that has nothing says so by `last` = `first` - 1."""
+    """HEARTBEAT (9.4.5.6). A writer that has nothing says so by `last` = `first` - 1."""
     return _HEARTBEAT.pack(
         Submessage.HEARTBEAT,
         _L | (0x02 if final else 0) | (0x04 if liveliness else 0),
@@ -181,7 +181,7 @@ def heartbeat(
 
 
 def gap(reader: EntityId, writer: EntityId, start: int, base: int, numbers: Iterable[int] = ()) -> bytes:
-    """GAP (9.4.5.6): `start` to `base` - 1 and `numbers`, which are from `base` to `base` + 255."""
+    """GAP (9.4.5.5): `start` to `base` - 1 and `numbers`, which are from `base` to `base` + 255."""
     return _submessage(
         Submessage.GAP,
         _L,
@@ -207,7 +207,7 @@ def acknack(
 def heartbeat_frag(
     reader: EntityId, writer: EntityId, sequence: int, last_fragment: int, count: int
 ) -> bytes:
-    """HEARTBEAT_FRAG (9.4.5.8): the fragments up to `last_fragment` are there."""
+    """HEARTBEAT_FRAG (9.4.5.7): the fragments up to `last_fragment` are there."""
     number = _LONGS.pack(sequence >> 32, sequence & _WORD)
     return _submessage(
         Submessage.HEARTBEAT_FRAG,
@@ -244,7 +244,7 @@ def info_ts(time: int | None) -> bytes:
 
 
 def info_dst(prefix: GuidPrefix) -> bytes:
-    """INFO_DST (9.4.5.9): what follows is for the participant `prefix`; 12 zeros = for everybody."""
+    """INFO_DST (9.4.5.8): what follows is for the participant `prefix`; 12 zeros = for everybody."""
     return _INFO_DST + prefix
 
 
