@@ -161,5 +161,5 @@ def run(network: SimulatedNetwork, span: int, *nodes: Node) -> None:
 
 def payload(number: int, size: int = 16) -> bytes:
     """A recognizable payload, encapsulation included; `size` a multiple of 4, since DATA is padded to that."""
-    head = b"\0\1\0\0" + number.to_bytes(4, "little")
+    head = b"\0\1\0\0" + number.to_bytes(8, "little")
     return (head * (size // len(head) + 1))[:size]
