@@ -85,6 +85,13 @@ class TestBuilt:
             )
         ]
 
+    def test_data_frag_with_inline_qos(self) -> None:
+        built = wire.data_frag(1, 2, 3, 1, 1, 8, 8, b"fragment", inline_qos=inline_qos(key_hash=bytes(16)))
+        (event,) = parse(built)
+        assert isinstance(event, wire.DataFrag)
+        assert event.inline_qos == {0x70: [bytes(16)]}
+        assert event.payload == b"fragment"
+
     @given(entities, entities, sequences, st.integers(-1, 1000), counts, st.booleans(), st.booleans())
     def test_heartbeat(
         self, reader: int, writer: int, first: int, more: int, count: int, final: bool, alive: bool
@@ -115,6 +122,10 @@ class TestBuilt:
     def test_heartbeat_frag(self, sequence: int, last: int, count: int) -> None:
         built = wire.heartbeat_frag(3, 4, sequence, last, count)
         assert parse(built) == [wire.HeartbeatFrag(A, None, 3, 4, sequence, last, count)]
+
+    def test_sets_are_as_short_as_can_be(self) -> None:
+        for missing, words in (([], 0), ([9], 1), ([9, 40], 1), ([9, 41], 2), ([264], 8)):
+            assert len(wire.acknack(3, 4, 9, missing, 1)) == 28 + 4 * words
 
     def test_counts_wrap(self) -> None:
         (event,) = parse(wire.heartbeat(0, 1, 1, 1, 2**32 + 5))
@@ -221,6 +232,7 @@ class TestForeign:
         beat = wire.heartbeat(1, 2, 1, 1, 1)
         unknown = [sub(kind, 1, b"whatever") for kind in (0x02, 0x30, 0x80, 0xFF)]
         assert len(parse(*unknown, sub(0x01, 1, b""), beat, sub(0x01, 0, b"pad pads"), beat)) == 2
+        assert parse(sub(0x01, 1, b"")) == parse(wire.info_ts(None)) == []
 
     def test_the_last_may_leave_its_length_open(self) -> None:
         sample = wire.data(1, 2, 1, b"\0\1\0\0 all the rest")
@@ -241,6 +253,7 @@ class TestForeign:
 
 BEAT = wire.heartbeat(1, 2, 1, 1, 1)
 IDS = struct.pack(">II", 1, 2)
+FRAGMENT = IDS + struct.pack("<iIIHHI", 0, 1, 1, 1, 4, 4) + b"frag"
 
 
 class TestBroken:
@@ -270,6 +283,9 @@ class TestBroken:
             (sub(0x15, 0x0D, b"\0\0\x10\0" + IDS + struct.pack("<iI", 0, 1)), "both a sample and a key"),
             (sub(0x15, 0x05, b"\0\0\x0f\0" + IDS + struct.pack("<iI", 0, 1)), "outside of itself"),
             (sub(0x15, 0x05, b"\0\0\x11\0" + IDS + struct.pack("<iI", 0, 1)), "outside of itself"),
+            (sub(0x16, 1, b"\0\0\x1b\0" + FRAGMENT), "outside of itself"),
+            (sub(0x16, 1, b"\0\0\x21\0" + FRAGMENT), "outside of itself"),
+            (sub(0x12, 1, IDS + struct.pack("<iIIII", 0, 1, 1, 32, 0)), "NACK_FRAG is too short"),
             (wire.data(1, 2, 1, b"", inline_qos=b"\x70\0\4\0"), "impossible length"),
             (wire.data(1, 2, 1, b"", inline_qos=b"\x70\0\4\0abcd"), "has no end"),
             (sub(0x06, 1, IDS + struct.pack("<iIII", 0, 1, 257, 0) + bytes(40)), "set of 257 numbers"),
