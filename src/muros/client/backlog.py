@@ -154,9 +154,13 @@ class Backlog:
             raise
 
     def _refuse(self, cause: int, code: int, writer: "Any", n: int) -> bool:
-        session = self.session
-        count = session.drops[cause] + 1
-        session.drops[cause] = count
-        if count & count - 1 == 0:  # the 1st, 2nd, 4th, 8th...: never a flood
-            session.problem(code, n, writer.name)
+        dropped(self.session, cause, code, n, writer)
         return False
+
+
+def dropped(session: "Any", cause: int, code: int, n: int, what: "object" = "") -> None:
+    """Counts a sample of ``n`` bytes in the session's ``drops``, and tells ``on_problem``."""
+    count = session.drops[cause] + 1
+    session.drops[cause] = count
+    if count & count - 1 == 0:  # the 1st, 2nd, 4th, 8th...: never a flood
+        session.problem(code, n, what)

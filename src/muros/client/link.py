@@ -15,7 +15,9 @@ is acknowledged and later messages came, or says ``_FOREIGN`` times in a row wha
 again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2, 8.3.5 and 8.4.
 """
 
-from muros.compat import const, ticks_add, ticks_diff, ticks_ms, urandom
+from struct import pack_into
+
+from muros.compat import MPY, const, ticks_add, ticks_diff, ticks_ms, urandom
 from muros.xrce.session import SessionCore
 
 TYPE_CHECKING = const(0)
@@ -58,6 +60,10 @@ _FOREIGN = const(8)
 
 _PROBLEM_SESSION = const(1)
 _PROBLEM_OUT_OF_STEP = const(2)
+_PROBLEM_UNREACHABLE = const(9)
+_PROBLEM_LARGEST = const(10)
+_PROBLEM_SILENT = const(11)
+_TOO_LONG = const(4)
 
 
 class Link(SessionCore):
@@ -72,6 +78,7 @@ class Link(SessionCore):
     on_state: "Callable[[int], object] | None" = None
     on_problem: "Callable[[int, str], object] | None" = None
     on_time: "Callable[[Buffer, int], object] | None" = None
+    trouble: "tuple[str, int | None] | None" = None  # what was told that keeps us from the agent
 
     def __init__(
         self, transport: "Transport", client_key: "int | bytes | None", session_id: int, mtu: int
@@ -107,8 +114,9 @@ class Link(SessionCore):
         if self.up:
             try:
                 taken = self.transport.receive(self._deliver)
-            except OSError:
+            except OSError as error:
                 self.up = False
+                self.problem(_PROBLEM_UNREACHABLE, 0, error)
         if not self.up and not self.login and self.state != LOST:
             self.happened(_SILENT)
         if self.login:
@@ -136,12 +144,24 @@ class Link(SessionCore):
         self.request = first + count
         return first
 
-    def problem(self, code: int, value: int = 0, what: str = "") -> None:
-        """Tells ``on_problem``."""
-        if self.on_problem is not None:
+    def problem(self, code: int, value: int = 0, what: "object" = "") -> None:
+        """Tells ``on_problem``; hosts print when there is none."""
+        if not MPY:
+            from muros.client.reasons import tell
+
+            tell(self, code, value, what)
+        elif self.on_problem is not None and (code != _PROBLEM_UNREACHABLE or not self.trouble):
             from muros.client.problems import text
 
+            if code == _PROBLEM_UNREACHABLE:
+                self.trouble = ("", None)
             self.on_problem(code, text(code, value, what))
+
+    def too_long(self, stream_id: int, n: int) -> None:
+        """A sample that came was larger than ``largest``."""
+        from muros.client.backlog import dropped
+
+        dropped(self, _TOO_LONG, _PROBLEM_LARGEST, n)
 
     def work(self, now: int) -> None:
         """What there is to do while CONNECTING or CONNECTED."""
@@ -158,10 +178,17 @@ class Link(SessionCore):
             self.login = True
         self.enter(new)
 
+    def ask(self, request: int) -> None:
+        """Asks the agent whether it knows the session."""
+        pack_into(">HHI", self._control, self.control(_GET_INFO, 8), request, _OBJECT_AGENT, 0x02000000)
+        self.send_control()
+
     def enter(self, state: int) -> None:
         """Is in a state, and tells when it is a new one."""
         if state != self.state:
             self.state = state
+            if state == CONNECTED:
+                self.trouble = None
             if self.on_state is not None:
                 self.on_state(state)
 
@@ -222,10 +249,13 @@ class Link(SessionCore):
         if self._due is not None and ticks_diff(now, self._due) < 0:
             return False
         self._due = ticks_add(now, again)
+        if not MPY:
+            self.problem(_PROBLEM_SILENT)
         if not self.up:
             try:
                 self.up = self.transport.open()
-            except OSError:
+            except OSError as error:
+                self.problem(_PROBLEM_UNREACHABLE, 0, error)
                 return False
         return self.up
 
@@ -262,15 +292,7 @@ class Link(SessionCore):
     def _ask(self) -> None:
         if self._ping == 0:
             self._ping = self.requests(1)
-        at = self.control(_GET_INFO, 8)
-        out = self._control
-        out[at] = self._ping >> 8
-        out[at + 1] = self._ping & 255
-        out[at + 2] = 0xFF
-        out[at + 3] = 0xFD
-        out[at + 4] = 2
-        out[at + 5] = out[at + 6] = out[at + 7] = 0
-        self.send_control()
+        self.ask(self._ping)
 
     def _hello(self) -> None:
         from muros.client.hello import hello

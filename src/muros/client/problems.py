@@ -1,6 +1,10 @@
-"""What a session reports to ``on_problem(code, text)``, in words."""
+"""What a session reports to ``on_problem(code, text)``, in few words. Hosts have more, see ``reasons``."""
 
 from muros.compat import const
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from typing import Any
 
 SESSION = const(1)
 OUT_OF_STEP = const(2)
@@ -10,6 +14,8 @@ NO_ANSWER = const(5)
 TOO_LARGE = const(6)
 OFFLINE = const(7)
 FULL = const(8)
+_UNREACHABLE = const(9)
+_LARGEST = const(10)
 
 _ERROR = const(0x80)
 _STATUS = (
@@ -24,25 +30,35 @@ _STATUS = (
 )
 
 
-def text(code: int, value: int, name: str) -> str:
-    """The problem ``code`` in words; ``value`` is a status or a number of bytes, ``name`` the entity's."""
+def text(code: int, value: int, what: "Any") -> str:
+    """The problem ``code`` in words.
+
+    ``value`` is a status or a number of bytes; ``what`` a writer, the name of another entity, or an OSError.
+    """
     if code == SESSION:
-        return "the agent refuses the session: " + _status(value)
+        return "the agent refuses the session: " + status(value)
     if code == OUT_OF_STEP:
         return "the agent's streams began again behind our back: connecting anew"
     if code == ENTITY:
-        return "the agent refuses " + name + ": " + _status(value)
+        return "the agent refuses %s: %s" % (what, status(value))
     if code == READ:
-        return "the agent refuses to read " + name + ": " + _status(value)
+        return "the agent refuses to read %s: %s" % (what, status(value))
     if code == NO_ANSWER:
         return "the agent does not answer requests to create entities; asking again"
+    if code == _UNREACHABLE:
+        return "no way to the agent: %s" % what
+    if code == _LARGEST:
+        return "%d B dropped: more than largest" % value
     if code == TOO_LARGE:
-        return "%d B of %s dropped: more than the MTU holds; publish reliably or raise it" % (value, name)
-    if code == OFFLINE:
-        return "%d B of %s dropped: no session, or the entity is not there" % (value, name)
-    return "%d B of %s dropped: the window is full; publish less often or set queue" % (value, name)
+        why = "more than the MTU holds; publish reliably or raise it"
+    elif code == OFFLINE:
+        why = "no session, or the writer is not there"
+    else:
+        why = "window or queue full"
+    return "%d B of %s dropped: %s" % (value, what.name, why)
 
 
-def _status(value: int) -> str:
+def status(value: int) -> str:
+    """A status of the agent in words."""
     i = value - _ERROR
     return "%s (0x%02x)" % (_STATUS[i] if 0 <= i < len(_STATUS) else "unknown status", value)

@@ -65,7 +65,7 @@ class Session(Link):
 
     ``on_state(state)`` is told each new state, ``on_problem(code, text)`` what was refused and why, see ``problems``.
     ``drops`` counts lost samples: while there was no session, because the window or queue was full, because they were
-    larger than a message, because they were for no reader of ours.
+    larger than a message, because they were for no reader of ours, because they were larger than ``largest``.
     """
 
     creation = "binary"
@@ -102,7 +102,7 @@ class Session(Link):
             self.create = (
                 create_text.Xml() if self.creation == "xml" else create_text.Reference(self.reference)
             )
-        self.drops = array("I", (0, 0, 0, 0))
+        self.drops = array("I", (0, 0, 0, 0, 0))
         self.entities: "list[Entity]" = []
         self.objects: "dict[int, Any]" = {}  # what takes DATA, by object id
         self.backlog: "Backlog | None" = None
