@@ -45,6 +45,12 @@ def test_what_everybody_has_can_be_dropped() -> None:
     assert (numbers(history), history.first()) == ([], None)
 
 
+def test_nothing_is_left_of_instances_that_are_dropped() -> None:
+    history = filled(2, *[b"%d" % number for number in range(100)])
+    history.drop_to(100)
+    assert history._instances == {}
+
+
 def test_an_instance_that_ended_is_forgotten_once_everybody_knows() -> None:
     history = filled(3, b"a", b"b", b"a")
     history.add(Sample(4, b"", instance=b"a", last=True))

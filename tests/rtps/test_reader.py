@@ -151,6 +151,16 @@ class TestOrder:
         assert bench.at_rest()
         assert bench.problems == []
 
+    def test_a_gap_does_not_take_away_what_is_there(self) -> None:
+        bench = Bench()
+        bench.data(2, 4, 7)
+        bench.gap(1, 4, 4, 5)
+        assert bench.got == [2, 4]
+        assert bench.core.writers[0].irrelevant == set()
+        bench.data(6)
+        assert bench.got == [2, 4, 6, 7]
+        assert bench.at_rest()
+
     def test_a_gap_may_be_huge(self) -> None:
         bench = Bench()
         bench.gap(1, 2**62)
@@ -176,6 +186,10 @@ class TestOrder:
         assert bench.problems == [(Problem.SAMPLES_LOST, 4)]  # 2, 3, 5 and 8; nobody misses 7
         bench.data(9)
         assert bench.got[-1] == 9
+        bench.gap(12, 14)
+        bench.beat(15, 15)
+        assert bench.problems[1:] == [(Problem.SAMPLES_LOST, 3)]  # 10, 11 and 14
+        bench.data(15)
         assert bench.at_rest()
 
     def test_what_was_gone_before_the_reader_came_is_not_lost(self) -> None:
@@ -272,6 +286,29 @@ class TestAsking:
         bench.data(3)  # something asked for has come: no need to wait
         bench.beat(1, 4)
         assert [ack.missing for ack in bench.take(AckNack)] == [(1, 4)]
+        bench.data(1)
+        bench.beat(1, 6)
+        assert [ack.missing for ack in bench.take(AckNack)] == [(4, 5, 6)]
+        bench.data(4)
+        bench.beat(1, 6)
+        assert [ack.missing for ack in bench.take(AckNack)] == [(5, 6)]
+        bench.fragments(5, 1)
+        bench.beat(1, 6)
+        assert [ack.missing for ack in bench.take(AckNack)] == [(6,)]
+        bench.gap(5, 6)
+        bench.beat(1, 6)
+        assert [ack.missing for ack in bench.take(AckNack)] == [(6,)]
+
+    def test_a_writer_that_left_is_asked_nothing(self) -> None:
+        bench = Bench(matched=False, response_delay=MS)
+        bench.match()
+        bench.beat(1, 5)
+        bench.match(b"x" * 12)
+        bench.sent.clear()
+        for writer in (THEM, b"x" * 12):
+            bench.core.unmatch_writer(guid_of(writer, WRITER))
+        bench.wait(60 * SECOND)
+        assert bench.sent == []
 
     def test_answers_wait_for_the_response_delay(self) -> None:
         bench = Bench(response_delay=5 * MS)

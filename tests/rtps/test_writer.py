@@ -17,6 +17,10 @@ from muros.rtps._writer import WriterCore
 from tests.rtps.nodes import MS, READER, SECOND, SMALL_WRITER, WRITER, payload
 
 ME = b"w" * 12
+
+HEADS = 400
+"""Bytes that may stand in a datagram besides the payload of one fragment."""
+
 E = TypeVar("E", bound=Event)
 
 
@@ -72,6 +76,7 @@ class Bench:
     def _send(self, submessages: list[bytes], destination: GuidPrefix | None, place: Place) -> None:
         head = [] if destination is None else [info_dst(destination)]
         datagram = message(ME, *head, *submessages)
+        assert len(datagram) <= self.core.settings.fragment_size + HEADS
         self.datagrams += 1
         self.bytes += len(datagram)
         self.sent += [(place, event) for event in parse_untrusted(datagram).submessages]
@@ -375,6 +380,44 @@ class TestAnswering:
         bench.wait(20 * MS)
         assert len(bench.take(Data)) == 90
 
+    def test_small_repairs_share_datagrams_that_are_not_too_large(self) -> None:
+        bench = Bench(depth=None, settings=WriterSettings(fragment_size=1500))
+        bench.match()
+        for number in range(100):
+            bench.core.write(payload(number, 100), bench.now)
+        bench.take(Data)
+        bench.acknack(1, tuple(range(1, 101)))
+        assert bench.datagrams == 10  # nine or ten of 136 bytes, their time stamps included, in each
+
+    def test_what_is_acknowledged_meanwhile_is_not_repaired(self) -> None:
+        bench = Bench(
+            transient_local=True, depth=None, settings=WriterSettings(burst=2000, fragment_size=1500)
+        )
+        bench.match()
+        for number in range(10):
+            bench.core.write(payload(number, 1000), bench.now)
+        bench.take(Data)
+        bench.acknack(1, tuple(range(1, 11)))
+        assert [data.sequence for data in bench.take(Data)] == [1, 2]
+        bench.acknack(10, (10,))
+        bench.wait(10 * MS)
+        assert [data.sequence for data in bench.take(Data)] == [10]
+
+    def test_a_large_repair_leaves_piece_by_piece(self) -> None:
+        bench = Bench(depth=None, settings=WriterSettings(burst=1000, fragment_size=200))
+        bench.match()
+        bench.core.write(payload(1, 5000), bench.now)
+        bench.core.write(payload(2), bench.now)
+        bench.wait(15 * MS)
+        bench.take(Data)
+        bench.acknack(1, (1, 2))
+        assert [fragment.first_fragment for fragment in bench.take(DataFrag)] == [1, 2, 3, 4, 5]
+        bench.acknack(1, (1, 2))  # asked for again while the rest waits
+        bench.wait(6 * MS)
+        events = [event for _, event in bench.sent if not isinstance(event, Heartbeat)]
+        assert [e.first_fragment for e in events if isinstance(e, DataFrag)] == list(range(6, 26))
+        assert isinstance(events[-1], Data)
+
     def test_a_fragment_that_is_missing_is_sent_again_alone(self) -> None:
         bench = self.written(1, settings=SMALL_WRITER)
         bench.core.write(payload(2, 1000), bench.now)
@@ -463,6 +506,15 @@ class TestKeeping:
         bench.wait(2)
         assert (bench.rooms, bench.problems) == (1, [(Problem.READER_STALLED, guid("r"), 2)])
         assert bench.core.held == 0
+        # It returns, and holds the writer again as if nothing had been.
+        bench.acknack(3)
+        assert bench.problems[1:] == [(Problem.READER_RETURNED, guid("r"), 2)]
+        for number in range(3):
+            bench.core.write(payload(number), bench.now)
+        assert bench.core.held == 2
+        bench.acknack(4)
+        assert len(bench.problems) == 2
+        assert bench.core.held == 1
 
 
 def _numbers(most: int = 40) -> st.SearchStrategy[int]:

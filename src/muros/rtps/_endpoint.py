@@ -42,7 +42,7 @@ class Problem(Enum):
     READER_STALLED = "reader-stalled"
     """A reader that acknowledged nothing for too long no longer holds the writer; the number: samples it lacks."""
     READER_RETURNED = "reader-returned"
-    """A stalled reader acknowledges again; the number: samples it will never get."""
+    """A stalled reader acknowledges again; the number: samples it has lost at most."""
     SAMPLES_LOST = "samples-lost"
     """The writer no longer has what had not arrived; the number: samples."""
     SAMPLE_TOO_LARGE = "sample-too-large"
