@@ -8,7 +8,7 @@ yet, of ``asked`` that its request is under way; ``steps`` itself stands for the
 from muros.client.link import CONNECTED
 from muros.client.names import dds_type
 from muros.client.qos import profile
-from muros.compat import const
+from muros.compat import const, ticks_add
 from muros.xrce.create import head
 
 TYPE_CHECKING = const(0)
@@ -19,13 +19,21 @@ if TYPE_CHECKING:
     from muros.client.qos import AnyQos
     from muros.client.session import Session
 
+_CREATE = const(1)
 _WRITE_DATA = const(7)
+_READ_DATA = const(8)
 _LITTLE_ENDIAN = const(0x01)
+_CREATE_FLAGS = const(0x07)  # little endian, REUSE and REPLACE
 _FIRST_REQUEST = const(10)
 _KIND_PARTICIPANT = const(1)
 _KIND_TOPIC = const(2)
 _KIND_DATAWRITER = const(5)
 _QOS_RELIABLE = const(0x01)
+_ERROR = const(0x80)
+_AT_ONCE = const(8)  # requests in flight: an agent with 16 unacknowledged messages loses a STATUS
+
+_PROBLEM_ENTITY = const(3)
+_PROBLEM_READ = const(4)
 
 
 def publish(self: "Any", message: "Message") -> bool:
@@ -37,11 +45,13 @@ def publish(self: "Any", message: "Message") -> bool:
     session = self.session
     n = message.size()
     stream = self.stream
-    if session.state == CONNECTED and self.todo == 0 and session.backlog is None:
+    if session.state == CONNECTED and self.todo == 0 and self.status == 0 and session.backlog is None:
         at = stream.reserve(n + 4)
         if at >= 0:
             request = session.request
-            session.request = request + 1 if request < 0xFFFF else _FIRST_REQUEST
+            if request == 0xFFFF:
+                request = _FIRST_REQUEST
+            session.request = request + 1
             head(stream.buf, at, _WRITE_DATA, _LITTLE_ENDIAN, n + 4, request, self.index << 4 | self.kind)
             try:
                 message.write(stream.buf, at + 8)
@@ -75,6 +85,58 @@ class Entity:
         if self.status:
             self.status = 0
         self.todo = (1 << self.steps + self.reads) - 1
+
+    def create(self, now: int) -> bool:
+        """Makes the requests that are not made yet; False when there is no room for them now."""
+        session = self.session
+        if self.request == 0:
+            self.request = session.requests(self.steps + 1)
+        for step in range(self.steps):
+            bit = 1 << step
+            if self.todo & bit and not self.asked & bit:
+                if session.waiting >= _AT_ONCE or not session.submit(
+                    _CREATE, _CREATE_FLAGS, self.request + step, self.object_id(step), self.variant(step)
+                ):
+                    return False
+                self.asked |= bit
+                session.waiting += 1
+                session.late = ticks_add(now, session.creation_timeout)
+        if self.todo == 1 << self.steps:
+            request = self.request + self.steps
+            if not session.submit(
+                _READ_DATA, _LITTLE_ENDIAN, request, self.object_id(self.steps - 1), self.reading()
+            ):
+                return False
+            self.todo = 0
+            session.pending -= 1
+        return True
+
+    def answered(self, step: int, object_id: int, status: int) -> bool:
+        """Takes the STATUS of request number ``step``; False when that is none of ours."""
+        if not 0 <= step <= self.steps:
+            return False
+        session = self.session
+        if step == self.steps:
+            if status < _ERROR or self.object_id(step - 1) != object_id:
+                return False
+            session.problem(_PROBLEM_READ, status, self.name)
+            return True
+        bit = 1 << step
+        if not self.asked & bit or self.object_id(step) != object_id:
+            return False
+        session.waiting -= 1
+        session.laps = 0
+        self.asked &= ~bit
+        if self.todo & bit:
+            self.todo &= ~bit
+            if status >= _ERROR:
+                self.status = status
+                self.todo = 0
+            if self.todo == 0:
+                session.pending -= 1
+            if status >= _ERROR:
+                session.problem(_PROBLEM_ENTITY, status, self.name)
+        return True
 
     def object_id(self, step: int) -> int:
         """The id of an object: ``index << 4 | kind``."""

@@ -75,6 +75,7 @@ class Link(SessionCore):
     keepalive = 1000
     ping_timeout = 300
     ping_attempts = 3
+    raised: "Exception | None" = None  # what a callback raised
     on_state: "Callable[[int], object] | None" = None
     on_problem: "Callable[[int, str], object] | None" = None
     on_time: "Callable[[Buffer, int], object] | None" = None
@@ -95,7 +96,7 @@ class Link(SessionCore):
         self.key = client_key
         self.mtu = mtu
         self.state = WAITING
-        self.request = _FIRST_REQUEST  # the next request id
+        self.request = _FIRST_REQUEST  # behind the request id that was used last
         self.login = True  # the agent has yet to accept us
         self.up = False  # the transport is open
         self._attempt = b""
@@ -106,7 +107,10 @@ class Link(SessionCore):
         self._probe = 0  # the number of a message that tells whether the agent's streams began again, plus 1
 
     def spin_once(self, now: "int | None" = None) -> int:
-        """Takes what has come and does what is due; returns the number of messages taken. Never waits."""
+        """Takes what has come and does what is due; returns the number of messages taken. Never waits.
+
+        What a callback raises comes out here once everything else is done; what it was told counts as told.
+        """
         if now is None:
             now = ticks_ms()
         self.now = now
@@ -128,6 +132,10 @@ class Link(SessionCore):
             self.work(now)
             self.flush(now)
             self.heartbeats(now)
+        if self.raised is not None:
+            raised = self.raised
+            self.raised = None
+            raise raised
         return taken
 
     def next(self, now: int) -> int:
@@ -146,16 +154,19 @@ class Link(SessionCore):
 
     def problem(self, code: int, value: int = 0, what: "object" = "") -> None:
         """Tells ``on_problem``; hosts print when there is none."""
-        if not MPY:
-            from muros.client.reasons import tell
+        try:
+            if not MPY:
+                from muros.client.reasons import tell
 
-            tell(self, code, value, what)
-        elif self.on_problem is not None and (code != _PROBLEM_UNREACHABLE or not self.trouble):
-            from muros.client.problems import text
+                tell(self, code, value, what)
+            elif self.on_problem is not None and (code != _PROBLEM_UNREACHABLE or not self.trouble):
+                from muros.client.problems import text
 
-            if code == _PROBLEM_UNREACHABLE:
-                self.trouble = ("", None)
-            self.on_problem(code, text(code, value, what))
+                if code == _PROBLEM_UNREACHABLE:
+                    self.trouble = ("", None)
+                self.on_problem(code, text(code, value, what))
+        except Exception as error:
+            self.raised = error
 
     def too_long(self, stream_id: int, n: int) -> None:
         """A sample that came was larger than ``largest``."""
@@ -275,8 +286,8 @@ class Link(SessionCore):
     def _watch(self, now: int) -> None:
         if self.foreign >= _FOREIGN:
             self.foreign = 0
-            self.problem(_PROBLEM_OUT_OF_STEP)
             self.happened(_UNKNOWN)
+            self.problem(_PROBLEM_OUT_OF_STEP)
         elif self.keepalive and ticks_diff(now, self._heard) >= self.keepalive:
             if self._ping == 0:
                 self._due = None

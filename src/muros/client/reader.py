@@ -52,7 +52,7 @@ class Reader(Endpoint):
         session = self.session
         if self.todo == 0 and self.status == 0:
             session.pending += 1
-            self.request = session.requests(1) - self.steps
+            self.request = session.requests(self.steps + 1)  # the last of them is for the READ_DATA
             self.todo = 1 << self.steps
 
     def reading(self) -> bytes:

@@ -9,7 +9,7 @@ others go on. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.3 and 7.8.5.
 from array import array
 
 from muros.client.link import CONNECTED, CONNECTING, LOST, WAITING, Link
-from muros.compat import MPY, const, sleep_ms, ticks_add, ticks_diff
+from muros.compat import MPY, const, sleep_ms, ticks_diff
 from muros.xrce import create
 from muros.xrce.create import head
 from muros.xrce.inputs import BestEffortInput, ReliableInput
@@ -29,24 +29,16 @@ if TYPE_CHECKING:
     from muros.client.services import OnReply, OnRequest, Replier, Requester
     from muros.xrce._types import Buffer
 
-_CREATE = const(1)
 _STATUS = const(5)
-_READ_DATA = const(8)
 _DATA = const(9)
 _TIMESTAMP_REPLY = const(15)
-_LITTLE_ENDIAN = const(0x01)
-_CREATE_FLAGS = const(0x07)  # little endian, REUSE and REPLACE
 _STREAM_BEST_EFFORT = const(0x01)
 _STREAM_RELIABLE = const(0x80)
 _OBJECT_CLIENT = const(0xFFFE)
-_ERROR = const(0x80)
-_AT_ONCE = const(8)  # requests in flight: an agent with 16 unacknowledged messages loses a STATUS
 _MADE = const(1)
 
 NO_READER = const(3)
 
-_PROBLEM_ENTITY = const(3)
-_PROBLEM_READ = const(4)
 _PROBLEM_NO_ANSWER = const(5)
 
 
@@ -109,8 +101,8 @@ class Session(Link):
         self.pending = 0  # entities that are not whole yet
         self.waiting = 0  # requests without a STATUS
         self._counts = bytearray(9)  # the next index for each kind of object
-        self._late = 0  # the tick when those are made again
-        self._laps = 0  # how often that happened since the last STATUS
+        self.late = 0  # the tick when those are made again
+        self.laps = 0  # how often that happened since the last STATUS
 
     def participant(self, name: str, domain: int = 0) -> "Participant":
         """A DDS participant, the node of ROS; names are cut at 59 characters."""
@@ -164,7 +156,7 @@ class Session(Link):
         """Milliseconds from ``now`` until ``spin_once`` has something to do of its own accord."""
         left = self.next(now)
         if self.pending:
-            left = min(left, ticks_diff(self._late, now)) if self.waiting else 0
+            left = min(left, ticks_diff(self.late, now)) if self.waiting else 0
         if not self.reliable.idle():
             left = min(left, ticks_diff(self.reliable.due, now))
         return max(left, 1)
@@ -251,60 +243,40 @@ class Session(Link):
     def work(self, now: int) -> None:
         """Creates what is to be created, and sends what waits."""
         if self.pending:
-            if self.waiting and ticks_diff(now, self._late) >= 0:
+            if self.waiting and ticks_diff(now, self.late) >= 0:
                 self.waiting = 0
-                self._laps += 1
-                if self._laps == 3:
-                    self.problem(_PROBLEM_NO_ANSWER)
                 for entity in self.entities:
                     entity.asked = 0
+                self.laps += 1
+                if self.laps == 3:
+                    self.problem(_PROBLEM_NO_ANSWER)
             for entity in self.entities:
-                if entity.todo and not self._create(entity, now):
+                if entity.todo and not entity.create(now):
                     break
         if self.pending == 0 and self.state == CONNECTING:
             self.happened(_MADE)
         if self.backlog is not None:
             self.backlog.pump()
 
-    def _create(self, entity: "Entity", now: int) -> bool:
-        """Makes the requests of an entity that are not made yet; False when there is no room for them now."""
-        if entity.request == 0:
-            entity.request = self.requests(entity.steps + 1)
-        for step in range(entity.steps):
-            bit = 1 << step
-            if entity.todo & bit and not entity.asked & bit:
-                object_id = entity.object_id(step)
-                if self.waiting >= _AT_ONCE or not self.submit(
-                    _CREATE, _CREATE_FLAGS, entity.request + step, object_id, entity.variant(step)
-                ):
-                    return False
-                entity.asked |= bit
-                self.waiting += 1
-                self._late = ticks_add(now, self.creation_timeout)
-        if entity.todo == 1 << entity.steps:
-            request = entity.request + entity.steps
-            if not self.submit(
-                _READ_DATA, _LITTLE_ENDIAN, request, entity.object_id(entity.steps - 1), entity.reading()
-            ):
-                return False
-            entity.todo = 0
-            self.pending -= 1
-        return True
-
     def _on(self, kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
-        if kind == _DATA:
-            reader = self.objects.get(buf[off + 2] << 8 | buf[off + 3]) if n >= 4 else None
-            if reader is None:
-                self.drops[NO_READER] += 1
+        try:
+            if kind == _DATA:
+                reader = self.objects.get(buf[off + 2] << 8 | buf[off + 3]) if n >= 4 else None
+                if reader is None:
+                    self.drops[NO_READER] += 1
+                else:
+                    reader.deliver(buf, off + 4, n - 4)
+            elif kind == _STATUS:
+                if n >= 6:
+                    self._on_status(
+                        buf[off] << 8 | buf[off + 1], buf[off + 2] << 8 | buf[off + 3], buf[off + 4]
+                    )
+            elif kind == _TIMESTAMP_REPLY and n >= 24 and self.on_time is not None:
+                self.on_time(buf, off)
             else:
-                reader.deliver(buf, off + 4, n - 4)
-        elif kind == _STATUS:
-            if n >= 6:
-                self._on_status(buf[off] << 8 | buf[off + 1], buf[off + 2] << 8 | buf[off + 3], buf[off + 4])
-        elif kind == _TIMESTAMP_REPLY and n >= 24 and self.on_time is not None:
-            self.on_time(buf, off)
-        else:
-            self.on_other(kind, buf, off, n)
+                self.on_other(kind, buf, off, n)
+        except Exception as error:  # of a callback: the message counts as handled
+            self.raised = error
         return 0
 
     def _on_status(self, request: int, object_id: int, status: int) -> None:
@@ -312,24 +284,5 @@ class Session(Link):
             self.login = True  # the agent has taken our leave
             return
         for entity in self.entities:
-            step = request - entity.request
-            if entity.request == 0 or not 0 <= step <= entity.steps:
-                continue
-            bit = 1 << step
-            if step == entity.steps:
-                if status >= _ERROR:
-                    self.problem(_PROBLEM_READ, status, entity.name)
-            elif entity.asked & bit and entity.object_id(step) == object_id:
-                self.waiting -= 1
-                self._laps = 0
-                entity.asked &= ~bit
-                if entity.todo & bit:
-                    if status < _ERROR:
-                        entity.todo &= ~bit
-                    else:
-                        self.problem(_PROBLEM_ENTITY, status, entity.name)
-                        entity.status = status
-                        entity.todo = 0
-                    if entity.todo == 0:
-                        self.pending -= 1
-            return
+            if entity.answered(request - entity.request, object_id, status):
+                return
