@@ -31,9 +31,10 @@ ELSEWHERE = {
     "muros/compat.py": frozenset({"micropython", "os", "sys", "time", "uctypes"}),
     "muros/xrce/_viper.py": frozenset({"micropython"}),
     "muros/client/discovery.py": frozenset({"select", "socket"}),
-    "muros/client/udp.py": frozenset({"select", "socket"}),
-    "muros/client/tcp.py": frozenset({"select", "socket"}),
-    "muros/client/serial.py": frozenset({"os", "select", "termios"}),
+    "muros/client/stream.py": frozenset({"select"}),
+    "muros/client/udp.py": frozenset({"socket"}),
+    "muros/client/tcp.py": frozenset({"socket"}),
+    "muros/client/serial.py": frozenset({"os", "termios"}),
     "muros/client/uart.py": frozenset({"machine"}),
 }
 """What single modules may import besides: the platform in ``compat``, native code, and the transports."""

@@ -133,8 +133,7 @@ class Link(SessionCore):
             self.flush(now)
             self.heartbeats(now)
         if self.raised is not None:
-            raised = self.raised
-            self.raised = None
+            raised, self.raised = self.raised, None
             raise raised
         return taken
 
