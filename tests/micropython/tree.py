@@ -20,6 +20,7 @@ BOARD_FLOOR = ("compat.py", "cdr.py", "xrce", "client", "rclc")
 HOST_ONLY = frozenset(
     {
         "muros/client/_types.py",
+        "muros/client/hosts.py",
         "muros/client/reasons.py",
         "muros/rclc/_types.py",
         "muros/xrce/_crc.py",

@@ -1,9 +1,10 @@
 """A device's link to an agent: transports, the session, ping, time synchronisation, discovery.
 
-Names are imported when they are first used, so that a board loads only what its program needs.
+Names are imported when they are first used, so that a board loads only what its program needs. Hosts have a session
+that checks more and says more.
 """
 
-from muros.compat import const
+from muros.compat import MPY, const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -26,6 +27,9 @@ _MODULES = (
     "Custom custom discover discovery CONNECTED link CONNECTING link LOST link WAITING link ping presence Qos qos "
     "Serial serial Session session Tcp tcp TimeSync timesync Uart uart Udp udp"
 )
+if not MPY:
+    _MODULES = _MODULES.replace("session", "hosts")
+    __all__ = [name for name in _MODULES.split()[::2] if name != "Uart"]
 
 
 def __getattr__(name: str) -> object:

@@ -31,7 +31,7 @@ class InfoError(ValueError):
 def discover(
     hosts: "tuple[str, ...] | list[str]" = (DISCOVERY_GROUP,),
     port: int = DISCOVERY_PORT,
-    attempts: int = 10,
+    attempts: int = 1,
     timeout: int = 1000,
     most: int = 4,
 ) -> "list[tuple[str, int]]":

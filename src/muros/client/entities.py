@@ -6,7 +6,7 @@ yet, of ``asked`` that its request is under way; ``steps`` itself stands for the
 """
 
 from muros.client.link import CONNECTED
-from muros.client.names import dds_type
+from muros.client.names import dds_type, topic_name
 from muros.client.qos import profile
 from muros.compat import const, ticks_add
 from muros.xrce.create import head
@@ -163,7 +163,7 @@ class Participant(Entity):
     def __init__(self, session: "Session", name: str, domain: int) -> None:
         self.index = session.index(_KIND_PARTICIPANT)
         self.domain = domain
-        super().__init__(session, name)
+        super().__init__(session, topic_name("", name))
 
     def object_id(self, step: int) -> int:
         """The id of the participant."""

@@ -17,7 +17,7 @@ again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2, 8.3.5 and 8.4.
 
 from struct import pack_into
 
-from muros.compat import MPY, const, ticks_add, ticks_diff, ticks_ms, urandom
+from muros.compat import const, ticks_add, ticks_diff, ticks_ms, urandom
 from muros.xrce.session import SessionCore
 
 TYPE_CHECKING = const(0)
@@ -62,7 +62,6 @@ _PROBLEM_SESSION = const(1)
 _PROBLEM_OUT_OF_STEP = const(2)
 _PROBLEM_UNREACHABLE = const(9)
 _PROBLEM_LARGEST = const(10)
-_PROBLEM_SILENT = const(11)
 _TOO_LONG = const(4)
 
 
@@ -152,18 +151,12 @@ class Link(SessionCore):
         return first
 
     def problem(self, code: int, value: int = 0, what: "object" = "") -> None:
-        """Tells ``on_problem``; hosts print when there is none."""
+        """Tells ``on_problem``."""
         try:
-            if not MPY:
-                from muros.client.reasons import tell
+            if self.on_problem is not None:
+                from muros.client.problems import tell
 
                 tell(self, code, value, what)
-            elif self.on_problem is not None and (code != _PROBLEM_UNREACHABLE or not self.trouble):
-                from muros.client.problems import text
-
-                if code == _PROBLEM_UNREACHABLE:
-                    self.trouble = ("", None)
-                self.on_problem(code, text(code, value, what))
         except Exception as error:
             self.raised = error
 
@@ -259,8 +252,6 @@ class Link(SessionCore):
         if self._due is not None and ticks_diff(now, self._due) < 0:
             return False
         self._due = ticks_add(now, again)
-        if not MPY:
-            self.problem(_PROBLEM_SILENT)
         if not self.up:
             try:
                 self.up = self.transport.open()

@@ -27,7 +27,8 @@ class _Answer:
 def ping(transport: "Transport", attempts: int = _ATTEMPTS, timeout: int = _TIMEOUT) -> bool:
     """Whether an agent answers over ``transport`` to one of ``attempts`` questions, each within ``timeout`` ms.
 
-    Opens the transport and leaves it open. What else comes in meanwhile is dropped: with a session, ask the session.
+    Opens the transport and leaves it open. What else comes in meanwhile is dropped: a transport that a session uses
+    is asked with ``Session.ping``.
     """
     answer = _Answer()
     for _ in range(attempts):

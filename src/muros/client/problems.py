@@ -6,6 +6,8 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
 
+    from muros.client.link import Link
+
 SESSION = const(1)
 OUT_OF_STEP = const(2)
 ENTITY = const(3)
@@ -28,6 +30,17 @@ _STATUS = (
     "incompatible version",
     "no resources",
 )
+
+
+def tell(session: "Link", code: int, value: int, what: "Any") -> None:
+    """Tells ``on_problem``, but why there is no way to the agent only when that changes; arguments as for ``text``."""
+    said = text(code, value, what)
+    if code == _UNREACHABLE:
+        if session.trouble is not None and session.trouble[0] == said:
+            return
+        session.trouble = (said, None)
+    if session.on_problem is not None:
+        session.on_problem(code, said)
 
 
 def text(code: int, value: int, what: "Any") -> str:

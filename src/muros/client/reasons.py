@@ -1,7 +1,6 @@
-"""What a session reports on hosts: why something was dropped or no agent is reached, and what to do about it.
+"""What a session reports on hosts, in words: why something was dropped or no agent is reached, and what to do about it.
 
-What keeps us from the agent is told once for each cause, and again when the cause has changed or the session was
-connected meanwhile. Programs without ``on_problem`` read it on standard error. Boards have no room for all this.
+Boards have no room for so many words, see ``problems``.
 """
 
 from __future__ import annotations
@@ -24,26 +23,6 @@ SILENT = 11
 """Codes beside those of ``problems``."""
 
 _AGAIN = "Trying again."
-_SILENCE = 3000  # ms without an answer until that is told
-_TOLD_SILENCE = "silent"
-
-
-def tell(session: Any, code: int, value: int, what: Any) -> None:
-    """Reports a problem of a session; arguments as for ``problems.text``."""
-    if code == SILENT:
-        value = _silence(session)
-        if value == 0:
-            return
-    said = text(session, code, value, what)
-    if code in (problems.SESSION, UNREACHABLE):
-        told = session.trouble is not None and session.trouble[0] == said
-        session.trouble = (said, None)
-        if told:
-            return
-    if session.on_problem is not None:
-        session.on_problem(code, said)
-    else:
-        say(said)
 
 
 def say(text: str) -> None:
@@ -67,19 +46,6 @@ def text(session: Session, code: int, value: int, what: Any) -> str:
         why = _offline(session, what) if code == problems.OFFLINE else _full(session)
         return f"{value} B of {what.name} dropped: {why}"
     return problems.text(code, value, what)
-
-
-def _silence(session: Session) -> int:
-    """The ms without an answer when that is to be told, else 0; asked at each attempt."""
-    if session.state == CONNECTED or session.transport.mtu == 0:  # the transport of a closed session has none
-        return 0
-    cause, since = session.trouble or ("", None)
-    if since is None:
-        since = session.now
-    silence = session.now - since
-    told = silence < _SILENCE or cause == _TOLD_SILENCE
-    session.trouble = (cause if told else _TOLD_SILENCE, since)
-    return 0 if told else silence
 
 
 def _offline(session: Session, writer: Any) -> str:

@@ -8,17 +8,16 @@ others go on. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.3 and 7.8.5.
 
 from array import array
 
-from muros.client.link import CONNECTED, CONNECTING, LOST, WAITING, Link
-from muros.compat import MPY, const, sleep_ms, ticks_diff
+from muros.client.link import CONNECTING, Link
+from muros.compat import MPY, const, sleep_ms, ticks_diff, ticks_ms
 from muros.xrce import create
 from muros.xrce.create import head
 from muros.xrce.inputs import BestEffortInput, ReliableInput
 from muros.xrce.outputs import BestEffortOutput, ReliableOutput
 
-__all__ = ["CONNECTED", "CONNECTING", "LOST", "WAITING", "Session"]
-
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from typing import Any, Unpack
 
     from muros.client._types import Message, OnData, Options, Transport
@@ -44,6 +43,8 @@ _PROBLEM_NO_ANSWER = const(5)
 
 class Session(Link):
     """A session with an agent over ``transport``. Nothing but wrong arguments raises; faults change ``state``.
+
+    On hosts ``muros.client.Session`` is a subclass, which checks arguments and prints problems, see ``hosts``.
 
     ``client_key`` is an integer below 2**32 or 4 bytes, never 0; None draws one. With ``session_id`` from 0x80 on,
     headers carry no key. ``mtu`` (0: the transport's) bounds messages both ways to ``mtu - 4`` bytes. ``history``, a
@@ -82,8 +83,7 @@ class Session(Link):
             if not hasattr(Session, name):
                 raise TypeError("Session has no option " + name)
             setattr(self, name, options[name])  # type: ignore[literal-required]
-        if self.largest == 0:
-            self.largest = mtu * history * (1 if MPY else 64)
+        self.largest = self.largest or mtu * history * (1 if MPY else 64)
         self.reliable = ReliableOutput(_STREAM_RELIABLE, mtu, self.head, history, self.heartbeat)
         self.outputs[_STREAM_RELIABLE] = self.reliable
         self.inputs[_STREAM_RELIABLE] = ReliableInput(_STREAM_RELIABLE, mtu, history)
@@ -105,10 +105,10 @@ class Session(Link):
         self.laps = 0  # how often that happened since the last STATUS
 
     def participant(self, name: str, domain: int = 0) -> "Participant":
-        """A DDS participant, the node of ROS; names are cut at 59 characters."""
+        """A DDS participant, the node of ROS. ValueError for a name longer than 59 characters."""
         from muros.client.entities import Participant
 
-        return Participant(self, name[:59], domain)
+        return Participant(self, name, domain)
 
     def writer(self, node: "Participant", topic: str, kind: str, qos: "AnyQos" = "default") -> "Writer":
         """A writer of ``topic`` with messages of a type, named as in ROS or in DDS. ``publish(message)`` sends."""
@@ -145,6 +145,12 @@ class Session(Link):
 
         return Replier(self, node, name, kind, on_request, qos)
 
+    def ping(self, timeout: int = 1000, clock: "Callable[[], int]" = ticks_ms) -> bool:
+        """Asks the agent, within the session: whether it answers within ``timeout`` ms and knows us."""
+        from muros.client.echo import ask
+
+        return ask(self, timeout, clock)
+
     def wait(self, timeout: int) -> None:
         """Waits until something may have come, at most ``timeout`` ms."""
         if self.up:
@@ -175,8 +181,7 @@ class Session(Link):
             return self.reliable
         if _STREAM_BEST_EFFORT not in self.outputs:
             self.outputs[_STREAM_BEST_EFFORT] = BestEffortOutput(_STREAM_BEST_EFFORT, self.mtu, self.head)
-        made: "BestEffortOutput" = self.outputs[_STREAM_BEST_EFFORT]
-        return made
+        return self.outputs[_STREAM_BEST_EFFORT]  # type: ignore[no-any-return]
 
     def make_input(self, stream_id: int) -> "BestEffortInput | None":
         """The stream for best effort is made when something comes on it; there are no others."""
