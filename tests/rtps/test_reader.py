@@ -319,7 +319,46 @@ class TestAsking:
         bench.wait(5 * MS)
         (ack,) = bench.take(AckNack)
         assert (ack.base, ack.missing) == (2, (2, 3))
+        bench.data(2, 3)
+        bench.wait(SECOND)
+        assert bench.sent == []
         assert bench.core.deadline is None
+
+    def test_what_was_overtaken_is_asked_for_without_a_heartbeat(self) -> None:
+        bench = Bench()
+        bench.beat(1, 0)
+        bench.data(1, 3, 5)
+        bench.wait(9 * MS)
+        assert bench.sent == []
+        bench.data(4)
+        bench.wait(MS)
+        assert [ack.missing for ack in bench.take(AckNack)] == [(2,)]
+
+    def test_what_was_only_late_is_not_asked_for(self) -> None:
+        bench = Bench()
+        bench.beat(1, 0)
+        bench.data(2)
+        bench.wait(9 * MS)
+        bench.data(1)
+        bench.wait(SECOND)
+        assert bench.sent == []
+        assert bench.core.deadline is None
+
+    def test_what_does_not_come_is_asked_for_less_and_less_and_then_no_more(self) -> None:
+        bench = Bench()
+        bench.beat(1, 0)
+        bench.data(2)
+        times = []
+        for _ in range(5000):
+            bench.wait(10 * MS)
+            bench.data(bench.core.writers[0].last + 1)
+            if bench.take(AckNack):
+                times.append((bench.now - 1000 * SECOND) // MS)
+        assert times[:6] == [10, 30, 70, 150, 310, 630]
+        assert len(times) == 17
+        assert times[-1] - times[-2] == 1000
+        bench.beat(1, 9)  # a heartbeat still has its answer
+        assert [ack.missing for ack in bench.take(AckNack)] == [(1,)]
 
     def test_all_places_of_a_writer_are_told(self) -> None:
         bench = Bench()
@@ -358,6 +397,30 @@ class TestFragments:
         assert isinstance(nack, NackFrag)
         assert (ack.base, ack.missing, ack.final) == (1, (1, 3), False)
         assert (nack.sequence, nack.missing, nack.count) == (2, (3, 5, 6, 7, 8, 9, 10), 1)
+
+    def test_fragments_are_asked_for_when_they_have_stopped_coming(self) -> None:
+        bench = Bench()
+        bench.beat(1, 0)
+        for fragment in range(1, 9):
+            bench.fragments(1, fragment)
+            bench.wait(8 * MS)
+            assert bench.sent == []
+        bench.wait(3 * MS)
+        assert [nack.missing for nack in bench.take(NackFrag)] == [(9, 10)]
+        bench.fragments(1, 9, 10)
+        bench.wait(SECOND)
+        assert bench.sent == []
+
+    def test_fragments_are_asked_for_when_they_were_overtaken(self) -> None:
+        bench = Bench()
+        bench.fragments(1, 1, 2, 3)
+        for fragment in range(1, 4):
+            bench.wait(4 * MS)
+            bench.fragments(2, fragment)
+        ack, nack = bench.sent
+        assert isinstance(ack, AckNack)
+        assert isinstance(nack, NackFrag)
+        assert (ack.base, ack.missing, nack.sequence) == (1, (), 1)
 
     def test_a_heartbeat_of_fragments_asks_too(self) -> None:
         bench = Bench()

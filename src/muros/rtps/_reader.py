@@ -7,6 +7,10 @@ will be asked for again. GAPs and the first number of a HEARTBEAT move `expected
 come any more. A HEARTBEAT is answered by an ACKNACK that says what is missing, and NACK_FRAG for samples of which
 fragments are there. What was asked for is not asked for again before `hold_off`, unless some of it has come.
 
+Some writers send heartbeats only every few seconds, so the reader does not wait for them where it knows better:
+what has been overtaken by later samples, and fragments that have stopped coming, are asked for after `hold_off`;
+and what does not come after all is asked for again, less and less often.
+
 A reader that has just met a writer knows nothing of it: it says so with an ACKNACK of its own accord, repeated
 until a HEARTBEAT comes.
 
@@ -143,7 +147,7 @@ class ReaderCore:
                 self._hold(proxy, event)
                 proxy.paused = True
         else:
-            self._take_early(proxy, event)
+            self._take_early(proxy, event, now)
 
     def on_data_frag(self, event: DataFrag, now: int) -> None:
         """Fragments of a sample have come (8.4.14.1)."""
@@ -162,13 +166,16 @@ class ReaderCore:
                 self._refuse(proxy, event)
                 return
             assembly = proxy.assemblies[number] = Assembly(event, now)
-            if not proxy.reliable:
+            if proxy.reliable:
+                self._overtaken(proxy, number - 1, now)
+            else:
                 self._limit_assemblies(proxy)
                 self._wake(proxy, now + self.settings.assembly_time)
         elif not assembly.fits(event):
             self._tell(Problem.INCONSISTENT, proxy, 1)
             return
         proxy.held += assembly.add(event)
+        proxy.fragment_at = now
         if number <= proxy.asked_to:
             proxy.progress = True
         if assembly.complete():
@@ -191,7 +198,8 @@ class ReaderCore:
                 proxy.floor = max(proxy.floor, event.first)
             self._advance(proxy)
         proxy.last = max(proxy.last, event.last)
-        if proxy.expected <= proxy.last or not event.final:
+        proxy.owes |= not event.final
+        if proxy.expected <= proxy.last or proxy.owes:
             self._answer_soon(proxy, now)
 
     def on_heartbeat_frag(self, event: HeartbeatFrag, now: int) -> None:
@@ -240,6 +248,7 @@ class ReaderCore:
                 proxy.paused = False
                 self._advance(proxy)
                 if proxy.expected > before:
+                    proxy.owes = True
                     self._answer(proxy, now)
 
     def tick(self, now: int) -> int | None:
@@ -270,7 +279,7 @@ class ReaderCore:
         if not self._deliver(proxy.guid, event):
             self._tell(Problem.SAMPLES_LOST, proxy, 1)
 
-    def _take_early(self, proxy: WriterProxy, event: Data) -> None:
+    def _take_early(self, proxy: WriterProxy, event: Data, now: int) -> None:
         """Keep a sample that is not the next to deliver, unless it was delivered or there is no place for it."""
         number = event.sequence
         if not proxy.expected < number < proxy.expected + self.settings.window:
@@ -283,6 +292,7 @@ class ReaderCore:
         self._hold(proxy, event)
         if proxy.held > self.settings.memory:
             self._make_room(proxy)
+        self._overtaken(proxy, number, now)
 
     def _hold(self, proxy: WriterProxy, event: Data) -> None:
         proxy.pending[event.sequence] = event
@@ -391,26 +401,48 @@ class ReaderCore:
             at = max(at, proxy.asked_at + self.settings.hold_off)
         if at <= now:
             self._answer(proxy, now)
-        elif at < proxy.answer_at:
+        else:
+            self._answer_at(proxy, at)
+
+    def _overtaken(self, proxy: WriterProxy, last: int, now: int) -> None:
+        """Everything up to `last` has been sent, and something of it may be missing."""
+        proxy.last = max(proxy.last, last)
+        if proxy.progress or proxy.asked_to < proxy.expected:  # else it was asked for, and will be again
+            self._answer_at(proxy, now + self.settings.hold_off)
+
+    def _answer_at(self, proxy: WriterProxy, at: int) -> None:
+        if at < proxy.answer_at:
             proxy.answer_at = at
             self._wake(proxy, at)
 
     def _answer(self, proxy: WriterProxy, now: int) -> None:
         """Say what is there, what is missing, and of which samples fragments are missing (8.3.7.1, 8.3.7.10)."""
         proxy.answer_at = NEVER
+        hold_off = self.settings.hold_off
+        if proxy.assemblies and (latest := max(proxy.assemblies)) > proxy.last:
+            if now - proxy.fragment_at >= hold_off:
+                proxy.last = latest  # no more fragments are on their way
+            else:
+                self._answer_at(proxy, proxy.fragment_at + hold_off)
         expected, pending, irrelevant, assemblies = (
             proxy.expected, proxy.pending, proxy.irrelevant, proxy.assemblies,
         )  # fmt: skip
         end = min(proxy.last + 1, expected + min(MAX_SET, self.settings.window))
         wanted = [n for n in range(expected, end) if n not in pending and n not in irrelevant]
+        if not wanted and not proxy.owes:
+            return
+        proxy.owes = False
         missing = [number for number in wanted if number not in assemblies]
         partial = [number for number in wanted if number in assemblies][:NACK_FRAGS_MOST]
         submessages = [self._acknack(proxy, missing, final=not wanted)]
         submessages += [self._nack_frag(proxy, n, assemblies[n].missing(MAX_SET)) for n in partial]
         if wanted:
+            proxy.asks = 0 if proxy.progress or proxy.asked_to < expected else proxy.asks + 1
             proxy.asked_at = now
             proxy.asked_to = wanted[-1]
             proxy.progress = False
+            if proxy.asks < self.settings.asks:
+                self._answer_at(proxy, now + min(2 * hold_off << proxy.asks, self.settings.slowest))
         self._send_to(proxy, submessages)
 
     def _acknack(self, proxy: WriterProxy, missing: list[int], *, final: bool) -> bytes:

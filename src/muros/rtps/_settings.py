@@ -63,7 +63,12 @@ class ReaderSettings:
     response_delay: int = 0
     """A heartbeat is answered after this time, together with those that follow it."""
     hold_off: int = 10 * MILLISECOND
-    """What is missing is asked for again after this time, or when some of it has come."""
+    """What is missing is asked for when it has been overtaken by this time, and again after this time, or when some
+    of it has come; the pause doubles while nothing comes."""
+    slowest: int = SECOND
+    """The longest such pause."""
+    asks: int = 16
+    """How often in a row it is asked for without a heartbeat and without success."""
     hello_period: int = 100 * MILLISECOND
     """A writer of which nothing is known is asked again after this time; the pause doubles."""
     hellos: int = 8
@@ -72,11 +77,11 @@ class ReaderSettings:
     """Fragments of a best-effort sample are dropped when the rest has not come after this time."""
 
     def __post_init__(self) -> None:
-        for name in ("window", "memory", "hello_period", "hellos", "assembly_time"):
+        for name in ("window", "memory", "hold_off", "slowest", "hello_period", "hellos", "assembly_time"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
-        if self.response_delay < 0 or self.hold_off < 0:
-            raise ValueError("response_delay and hold_off must not be negative")
+        if self.response_delay < 0 or self.asks < 0:
+            raise ValueError("response_delay and asks must not be negative")
 
 
 READER_DEFAULTS: Final = ReaderSettings()

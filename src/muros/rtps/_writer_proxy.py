@@ -12,9 +12,10 @@ class WriterProxy:
     """One matched writer: where it is, what has come from it too early, what was asked of it."""
 
     __slots__ = (
-        "answer_at", "asked_at", "asked_to", "assemblies", "count", "entity", "expected", "floor", "fragment_count",
-        "guid", "held", "hello_at", "hellos", "irrelevant", "last", "paused", "pending", "places", "prefix",
-        "progress", "reliable", "sent_count", "sent_fragment_count", "skip",
+        "answer_at", "asked_at", "asked_to", "asks", "assemblies", "count", "entity", "expected", "floor",
+        "fragment_at", "fragment_count", "guid", "held", "hello_at", "hellos", "irrelevant", "last", "owes",
+        "paused", "pending", "places", "prefix", "progress", "reliable", "sent_count",
+        "sent_fragment_count", "skip",
     )  # fmt: skip
 
     def __init__(
@@ -28,7 +29,7 @@ class WriterProxy:
         self.expected = 1
         """The next sample to deliver."""
         self.last = 0
-        """The last sample the writer said it has."""
+        """The last sample the writer is known to have sent."""
         self.pending: dict[int, Data] = {}
         """Samples that came early, or were refused."""
         self.irrelevant: set[int] = set()
@@ -51,6 +52,12 @@ class WriterProxy:
         self.sent_fragment_count = 0
         self.answer_at = NEVER
         """When an ACKNACK is to be sent."""
+        self.owes = False
+        """It was asked for."""
+        self.asks = 0
+        """How often in a row something was asked for in vain."""
+        self.fragment_at = 0
+        """When the last fragment came."""
         self.asked_at = -NEVER
         """When something was asked for."""
         self.asked_to = 0
