@@ -11,14 +11,18 @@ Deliver = Callable[[Buffer, int, int], object]
 """Takes a message from a transport: ``deliver(buf, off, n)``; the bytes are only lent."""
 
 
-class Message(Protocol):
-    """What generated message classes offer."""
+class Outgoing(Protocol):
+    """What can be sent."""
 
     def size(self) -> int:
         """Bytes of the body."""
 
     def write(self, buf: bytearray, off: int, /) -> int:
         """Writes the body at ``off`` and returns its end."""
+
+
+class Message(Outgoing, Protocol):
+    """What generated message classes offer."""
 
     def read(self, buf: Buffer, off: int, n: int, /) -> object:
         """Takes the body ``buf[off:off + n]``; raises ValueError when it is malformed."""

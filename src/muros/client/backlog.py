@@ -15,7 +15,7 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
 
-    from muros.client._types import Message
+    from muros.client._types import Outgoing
     from muros.client.session import Session
     from muros.xrce._types import Buffer
 
@@ -43,7 +43,7 @@ class Backlog:
         self._cut: "bytes | bytearray | None" = None  # in fragments, the last one not acknowledged
         self._held: "list[bytes | bytearray]" = []
 
-    def defer(self, writer: "Any", message: "Message", n: int) -> bool:
+    def defer(self, writer: "Any", message: "Outgoing", n: int) -> bool:
         """Sends a sample of ``n`` bytes if it can go out now, else queues it, or counts and reports it."""
         session = self.session
         stream = writer.stream
@@ -143,7 +143,7 @@ class Backlog:
             self._held.append(self._cut)
         self._cut = None
 
-    def _write(self, buf: bytearray, at: int, writer: "Any", message: "Message", n: int) -> None:
+    def _write(self, buf: bytearray, at: int, writer: "Any", message: "Outgoing", n: int) -> None:
         request = self.session.requests(1)
         head(buf, at, _WRITE_DATA, _LITTLE_ENDIAN, n + _HEAD, request, writer.index << 4 | writer.kind)
         try:

@@ -15,7 +15,7 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
 
-    from muros.client._types import Message
+    from muros.client._types import Outgoing
     from muros.client.qos import AnyQos
     from muros.client.session import Session
 
@@ -36,7 +36,7 @@ _PROBLEM_ENTITY = const(3)
 _PROBLEM_READ = const(4)
 
 
-def publish(self: "Any", message: "Message") -> bool:
+def publish(self: "Any", message: "Outgoing") -> bool:
     """Sends a message. False when it was not taken: the session's ``drops`` and ``on_problem`` say why.
 
     A reliable message that was taken arrives once and in order for as long as the agent keeps the session; when the

@@ -6,6 +6,7 @@ has to begin with the same.
 """
 
 from muros.client.entities import Entity, publish
+from muros.client.link import CONNECTED
 from muros.client.names import dds_type, topic_name
 from muros.client.qos import profile
 from muros.compat import const, copy
@@ -14,8 +15,9 @@ from muros.xrce.create import read_data
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from typing import Any
 
-    from muros.client._types import Message
+    from muros.client._types import Message, Outgoing
     from muros.client.entities import Participant
     from muros.client.qos import AnyQos
     from muros.client.session import Session
@@ -39,15 +41,24 @@ class _Service(Entity):
     kind = 0
     reads = 1
 
-    def __init__(self, session: "Session", node: "Participant", name: str, kind: str, qos: "AnyQos") -> None:
+    def __init__(
+        self,
+        session: "Session",
+        node: "Participant",
+        name: str,
+        kind: str,
+        callback: "Any",
+        qos: "AnyQos",
+    ) -> None:
+        self.callback = callback
         self.node = node
         self.type_name = kind
         self.name = name
         self.stream = session.output(profile(qos).flags & _QOS_RELIABLE)
         self.session = session
         self.index = session.index(self.kind)
-        session.objects[self.object_id(0)] = self
         self.variant(0)  # complains now about what cannot be
+        session.objects[self.object_id(0)] = self
         super().__init__(session, name)
 
     def object_id(self, step: int) -> int:
@@ -68,6 +79,17 @@ class _Service(Entity):
         )
         return made
 
+    def room(self) -> bool:
+        """Whether a sample that is written now can go out."""
+        session = self.session
+        stream = session.reliable
+        return (
+            session.state == CONNECTED
+            and session.backlog is None
+            and self.todo == 0
+            and (self.stream is not stream or stream.free() > 0)
+        )
+
     def reading(self) -> bytes:
         """The read specification: everything, for ever."""
         stream_id = _STREAM_RELIABLE if self.stream.reliable else _STREAM_BEST_EFFORT
@@ -77,21 +99,9 @@ class _Service(Entity):
 
 
 class Requester(_Service):
-    """The client's side. ``on_reply(number, buf, off, n)`` gets replies, with the number that ``send`` gave."""
+    """The client's side. ``callback(number, buf, off, n)`` gets replies, with the number that ``send`` gave."""
 
     kind = _KIND_REQUESTER
-
-    def __init__(
-        self,
-        session: "Session",
-        node: "Participant",
-        name: str,
-        kind: str,
-        on_reply: "OnReply",
-        qos: "AnyQos",
-    ) -> None:
-        self.on_reply = on_reply
-        super().__init__(session, node, name, kind, qos)
 
     def send(self, request: "Message") -> int:
         """Sends a request; its number, or 0 when it was not taken."""
@@ -100,25 +110,13 @@ class Requester(_Service):
     def deliver(self, buf: "Buffer", off: int, n: int) -> None:
         """Takes a reply."""
         if n >= 4:
-            self.on_reply(buf[off] << 8 | buf[off + 1], buf, off + 4, n - 4)
+            self.callback(buf[off] << 8 | buf[off + 1], buf, off + 4, n - 4)
 
 
 class Replier(_Service):
-    """The server's side. ``on_request(identity, buf, off, n)`` gets requests; ``reply`` answers them, at any time."""
+    """The server's side. ``callback(identity, buf, off, n)`` gets requests; ``reply`` answers them, at any time."""
 
     kind = _KIND_REPLIER
-
-    def __init__(
-        self,
-        session: "Session",
-        node: "Participant",
-        name: str,
-        kind: str,
-        on_request: "OnRequest",
-        qos: "AnyQos",
-    ) -> None:
-        self.on_request = on_request
-        super().__init__(session, node, name, kind, qos)
 
     def reply(self, identity: bytes, reply: "Message") -> bool:
         """Answers the request of that identity; False when it was not taken."""
@@ -128,13 +126,13 @@ class Replier(_Service):
         """Takes a request."""
         if n >= _IDENTITY:
             identity = bytes(memoryview(buf)[off : off + _IDENTITY])
-            self.on_request(identity, buf, off + _IDENTITY, n - _IDENTITY)
+            self.callback(identity, buf, off + _IDENTITY, n - _IDENTITY)
 
 
 class _Identified:
     """A message behind the identity of the request it answers."""
 
-    def __init__(self, identity: bytes, message: "Message") -> None:
+    def __init__(self, identity: bytes, message: "Outgoing") -> None:
         self.identity = identity
         self.message = message
 
@@ -146,6 +144,3 @@ class _Identified:
         """Writes the body at ``off`` and returns its end."""
         copy(buf, off, self.identity, 0, _IDENTITY)
         return self.message.write(buf, off + _IDENTITY)
-
-    def read(self, buf: "Buffer", off: int, n: int) -> None:
-        """Not for messages of ours."""

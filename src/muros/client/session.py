@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, Unpack
 
-    from muros.client._types import Message, OnData, Options, Transport
+    from muros.client._types import OnData, Options, Outgoing, Transport
     from muros.client.backlog import Backlog
     from muros.client.entities import Entity, Participant, Writer
     from muros.client.qos import AnyQos
@@ -221,7 +221,7 @@ class Session(Link):
         stream.buf[at + 8 : at + 4 + n] = payload
         return True
 
-    def defer(self, writer: "Any", message: "Message", n: int) -> bool:
+    def defer(self, writer: "Any", message: "Outgoing", n: int) -> bool:
         """What becomes of a sample that cannot go out now: it is queued, cut up, or refused and counted."""
         return self.keep().defer(writer, message, n)
 

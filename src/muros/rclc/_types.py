@@ -26,12 +26,18 @@ class Publisher(Entity, Protocol):
 class Requester(Entity, Protocol):
     """Sends requests."""
 
+    def room(self) -> bool:
+        """Whether a request that is sent now can go out."""
+
     def send(self, request: Message, /) -> int:
         """Sends a request; its number, 0 when it was not taken."""
 
 
 class Replier(Entity, Protocol):
     """Answers requests."""
+
+    def room(self) -> bool:
+        """Whether an answer can go out now."""
 
     def reply(self, identity: bytes, reply: Message, /) -> bool:
         """Answers the request of that identity; False when it was not taken."""
@@ -98,18 +104,3 @@ class Middleware(Protocol):
 
     def close(self) -> None:
         """Ends."""
-
-
-class Handle(Protocol):
-    """What an executor runs."""
-
-    eager: bool
-
-    def ready(self, now: int, /) -> bool:
-        """Whether there is something to run."""
-
-    def run(self, now: int, /) -> object:
-        """Takes one piece of work and runs its callback."""
-
-    def left(self, now: int, /) -> int:
-        """Milliseconds until it is ready of its own accord; a large number when it never is."""

@@ -7,7 +7,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from muros.rclc._types import Handle, Middleware
+    from muros.rclc._types import Middleware
+    from muros.rclc.executor import Handle
     from muros.rclc.node import Node
 
 STATES = ("WAITING", "CONNECTING", "CONNECTED", "LOST")

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from muros.rclc.context import Context
 
 _TIMEOUT = const(1000)  # ms that one round of ``spin`` waits at most
+_NEVER = const(1000000)
 
 
 class Executor:
@@ -55,6 +56,7 @@ class Executor:
         if callback is not None:
             handle.callback = callback
         handle.eager = self.trigger is None
+        handle.handles = self.handles
         self.handles.append(handle)
 
     def remove(self, handle: "Any") -> None:
@@ -111,3 +113,27 @@ class Executor:
                 handle.run(now)
                 ran = True
         return ran
+
+
+class Handle:
+    """What executors run. ``eager``: without waiting for a trigger; ``entity`` is what the middleware made for it."""
+
+    eager = True
+    entity: "Any" = None
+    handles: "list[Any] | None" = None  # those of the executor that it was added to
+
+    def __init__(self, context: "Context") -> None:
+        self.context = context
+        context.handles.append(self)
+
+    def left(self, now: int) -> int:
+        """Milliseconds until it is ready of its own accord: it never is."""
+        return _NEVER
+
+    def destroy(self) -> None:
+        """Takes it away."""
+        handles = self.handles or self.context.handles
+        if self in handles:
+            handles.remove(self)
+        if self.entity is not None:
+            self.entity.destroy()

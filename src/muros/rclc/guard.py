@@ -1,6 +1,7 @@
 """Guard conditions: a program wakes its own executor."""
 
 from muros.compat import const
+from muros.rclc.executor import Handle
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -8,18 +9,14 @@ if TYPE_CHECKING:
 
     from muros.rclc.context import Context
 
-_NEVER = const(1000000)
 
-
-class GuardCondition:
+class GuardCondition(Handle):
     """After ``trigger()`` an executor calls ``callback()`` once."""
 
     def __init__(self, context: "Context", callback: "Callable[[], object]") -> None:
-        self.context = context
+        super().__init__(context)
         self.callback = callback
-        self.eager = True
         self._triggered = False
-        context.handles.append(self)
 
     def trigger(self) -> None:
         """Makes it ready."""
@@ -33,12 +30,3 @@ class GuardCondition:
         """Calls the callback."""
         self._triggered = False
         self.callback()
-
-    def left(self, now: int) -> int:
-        """Only a trigger makes it ready."""
-        return _NEVER
-
-    def destroy(self) -> None:
-        """Takes it away."""
-        if self in self.context.handles:
-            self.context.handles.remove(self)

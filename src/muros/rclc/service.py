@@ -1,6 +1,7 @@
 """Services: servers and clients."""
 
 from muros.compat import const, ticks_add, ticks_diff
+from muros.rclc.executor import Handle
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -14,33 +15,39 @@ _NEVER = const(1000000)
 _TIMEOUT = 10.0
 
 
-class Service:
+class Service(Handle):
     """Made by ``Node.service``. An executor calls ``callback(request)`` and sends the response that it returns.
 
     A callback that returns None answers later: it keeps ``service.identity`` and calls ``reply(identity, response)``.
-    ``malformed`` counts samples that are no request of this type.
+    At most ``depth`` requests wait to be taken, and as many answers to be sent; ``lost`` counts those that were dropped
+    for that or could never be sent. ``malformed`` counts samples that are no request of this type.
     """
 
-    eager = True
+    depth = 10
     identity = b""
+    lost = 0
     malformed = 0
 
     def __init__(self, context: "Context", kind: "Any", callback: "Callable[[Any], Any]") -> None:
-        self.context = context
+        super().__init__(context)
         self.callback = callback
-        self.entity: "Any" = None
         self._kind = kind
         self._waiting: "list[tuple[bytes, Any]]" = []
-        self._answers: "list[tuple[bytes, Any]]" = []  # those for which the window had no room
-        context.handles.append(self)
+        self._answers: "list[tuple[bytes, Any]]" = []  # those that cannot go out yet
 
     def reply(self, identity: bytes, response: "Any") -> None:
-        """Answers a request; one that cannot go out now goes with the next pass."""
-        if self._answers or not self.entity.reply(identity, response):
+        """Answers a request; an answer that cannot go out now goes when the middleware has room for it."""
+        if len(self._answers) < self.depth:
             self._answers.append((identity, response))
+            self._send()
+        else:
+            self.lost += 1
 
     def deliver(self, identity: bytes, buf: "Buffer", off: int, n: int) -> None:
         """Takes a request of the middleware."""
+        if len(self._waiting) >= self.depth:
+            self.lost += 1
+            return
         request = self._kind.Request()
         try:
             request.read(buf, off, n)
@@ -50,44 +57,46 @@ class Service:
         self._waiting.append((identity, request))
 
     def ready(self, now: int) -> bool:
-        """Whether a request waits, or an answer."""
-        return len(self._waiting) + len(self._answers) > 0
+        """Whether a request can be taken, or an answer sent."""
+        answers = len(self._answers)
+        return (answers < self.depth and len(self._waiting) > 0) or (answers > 0 and self.entity.room())
 
     def run(self, now: int) -> None:
         """Takes a request, calls the callback and answers."""
-        while self._answers and self.entity.reply(self._answers[0][0], self._answers[0][1]):
-            self._answers.pop(0)
-        if self._waiting:
+        self._send()
+        if self._waiting and len(self._answers) < self.depth:
             identity, request = self._waiting.pop(0)
             self.identity = identity
             response = self.callback(request)
             if response is not None:
                 self.reply(identity, response)
 
-    def left(self, now: int) -> int:
-        """It never becomes ready of its own accord."""
-        return _NEVER
-
     def destroy(self) -> None:
-        """Takes it away."""
-        if self in self.context.handles:
-            self.context.handles.remove(self)
-        self.entity.destroy()
+        """Takes it away, with all that waits."""
+        super().destroy()
+        self.depth = 0
+        self._waiting = []
+        self._answers = []
+
+    def _send(self) -> None:
+        """Sends what can be sent; an answer that is refused although there is room will never go."""
+        answers = self._answers
+        while answers and self.entity.room():
+            identity, response = answers.pop(0)
+            if not self.entity.reply(identity, response):
+                self.lost += 1
 
 
-class Client:
+class Client(Handle):
     """Made by ``Node.client``. ``malformed`` counts replies that are no response of this type."""
 
-    eager = True
     malformed = 0
 
     def __init__(self, context: "Context", kind: "Any") -> None:
-        self.context = context
-        self.entity: "Any" = None
+        super().__init__(context)
         self._kind = kind
         self._asked: "dict[int, tuple[Any, int]]" = {}  # number: (on_reply, deadline)
         self._waiting: "list[tuple[Any, Any]]" = []
-        context.handles.append(self)
 
     def send(self, request: "Any", on_reply: "Callable[[Any], object]", timeout: float = _TIMEOUT) -> bool:
         """Sends a request; an executor calls ``on_reply(response)``, with None after ``timeout`` seconds.
@@ -115,7 +124,7 @@ class Client:
             if left <= 0:
                 return None
             middleware.spin_once(now)
-            sent = sent or self.send(request, answers.append, timeout)
+            sent = sent or (self.entity.room() and self.send(request, answers.append, timeout))
             if self.ready(now):
                 self.run(now)
             else:
@@ -160,7 +169,7 @@ class Client:
         return left
 
     def destroy(self) -> None:
-        """Takes it away."""
-        if self in self.context.handles:
-            self.context.handles.remove(self)
-        self.entity.destroy()
+        """Takes it away, with all that waits."""
+        super().destroy()
+        self._asked = {}
+        self._waiting = []

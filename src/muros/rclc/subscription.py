@@ -2,6 +2,7 @@
 
 from muros.client.qos import profile
 from muros.compat import MPY, const
+from muros.rclc.executor import Handle
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -9,14 +10,11 @@ if TYPE_CHECKING:
     from typing import Any
 
     from muros.client.qos import Qos
-    from muros.rclc._types import Entity
     from muros.rclc.context import Context
     from muros.xrce._types import Buffer
 
-_NEVER = const(1000000)
 
-
-class Subscription:
+class Subscription(Handle):
     """Made by ``Node.subscription``. Up to ``depth`` messages wait: the QoS's depth on hosts, one on boards.
 
     When one more comes, an executor that only waits for new data has the oldest processed at once, so none is lost;
@@ -24,21 +22,18 @@ class Subscription:
     message of this type.
     """
 
-    eager = True
     lost = 0
     malformed = 0
 
     def __init__(
         self, context: "Context", kind: "Any", callback: "Callable[[Any], object] | None", qos: "str | Qos"
     ) -> None:
-        self.context = context
+        super().__init__(context)
         self.callback = callback
-        self.entity: "Entity | None" = None
         self.depth = 1 if MPY else profile(qos).depth or 1000
         self._kind = kind
         self._waiting: "list[Any]" = []
         self._message = kind()
-        context.handles.append(self)
 
     def take(self) -> "Any":
         """The oldest message that waits, or None."""
@@ -71,14 +66,3 @@ class Subscription:
         message = self._waiting.pop(0)
         if self.callback is not None:
             self.callback(message)
-
-    def left(self, now: int) -> int:
-        """It never becomes ready of its own accord."""
-        return _NEVER
-
-    def destroy(self) -> None:
-        """Takes it away."""
-        if self in self.context.handles:
-            self.context.handles.remove(self)
-        if self.entity is not None:
-            self.entity.destroy()

@@ -1,6 +1,7 @@
 """Timers, in whole milliseconds of the steady clock."""
 
 from muros.compat import const, ticks_add, ticks_diff
+from muros.rclc.executor import Handle
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -11,24 +12,22 @@ if TYPE_CHECKING:
 _NEVER = const(1000000)
 
 
-class Timer:
+class Timer(Handle):
     """Made by ``Node.timer``. Calls that come late do not shift the next: the phase is kept, whole periods that were
     missed are skipped. A period of 0 is always ready. ``since`` is the time from the last call to this one, in ms.
     """
 
-    eager = True
     since = 0
 
     def __init__(
         self, context: "Context", period: float, callback: "Callable[[], object]", autostart: bool
     ) -> None:
-        self.context = context
+        super().__init__(context)
         self.callback = callback
         self.period = int(period * 1000 + 0.5)
         self.cancelled = not autostart
         self._last = context.clock()
         self._next = ticks_add(self._last, self.period)
-        context.handles.append(self)
 
     def cancel(self) -> None:
         """Stops it, until ``reset``."""
@@ -67,5 +66,4 @@ class Timer:
     def destroy(self) -> None:
         """Takes it away."""
         self.cancelled = True
-        if self in self.context.handles:
-            self.context.handles.remove(self)
+        super().destroy()
