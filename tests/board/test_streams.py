@@ -1,8 +1,8 @@
 """Streams by themselves: windows, numbers that wrap, bitmaps, repetitions. See also ``tests/xrce/test_streams.py``."""
 
 from muros.compat import const
-from muros.xrce.inputs import BestEffortInput, ReliableInput
-from muros.xrce.outputs import BestEffortOutput, ReliableOutput
+from muros.xrce.inputs import Input
+from muros.xrce.outputs import Output
 from tests.board.harness import allocates, raises
 
 TYPE_CHECKING = const(0)
@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from muros.xrce._types import Buffer
 
 NEAR_WRAP = 65500
-DROP, NOW, LATER = 0, 1, 2
 
 
 class Line:
@@ -29,15 +28,16 @@ class Line:
         return taken
 
 
-def output(history: int = 4, mtu: int = 32, start: int = 0) -> ReliableOutput:
+def output(history: int = 4, mtu: int = 32, start: int = 0) -> Output:
     """A sender that has sent and got acknowledged everything before ``start``."""
-    stream = ReliableOutput(0x80, mtu, bytearray(b"\x81\0\0\0"), history, 100)
+    stream = Output(0x80, mtu, bytearray(b"\x81\0\0\0"), history, 100)
     stream.next = stream.first = stream.sent = start
     return stream
 
 
-def fill(stream: BestEffortOutput, n: int = 8) -> bool:
+def fill(stream: Output, n: int = 8) -> bool:
     """Puts one submessage of ``n`` bytes into the stream, its bytes all equal to its number."""
+    number = stream.next
     at = stream.reserve(n)
     if at < 0:
         return False
@@ -47,30 +47,34 @@ def fill(stream: BestEffortOutput, n: int = 8) -> bool:
     buf[at + 2] = n
     buf[at + 3] = 0
     for i in range(n):
-        buf[at + 4 + i] = stream.next & 255
+        buf[at + 4 + i] = number & 255
     return True
 
 
-def receiver(window: int = 16, start: int = 0) -> ReliableInput:
+def receiver(window: int = 16, start: int = 0) -> Input:
     """A receiver that expects ``start``."""
-    stream = ReliableInput(0x80, 32, window)
-    stream.expected = stream.end = start
+    stream = Input(0x80, 32, window)
+    stream.expected = start
     return stream
 
 
-def take(stream: ReliableInput, number: int) -> "list[int]":
+def take(stream: Input, number: int) -> "list[int]":
     """One message arrives; the numbers that were handled because of it."""
     number &= 0xFFFF
-    what = stream.accept(number)
     handled: "list[int]" = []
-    if what == LATER:
-        stream.store(number, bytes((number & 255, number >> 8)), 0, 2)
-    elif what == NOW:
+    if stream.accept(number, bytes((number & 255, number >> 8)), 0, 2):
         handled.append(number)
-        while stream.advance():
+        stream.advance(1)
+        while stream.ready():
             assert stream.size == 2
             handled.append(stream.buf[stream.base] | stream.buf[stream.base + 1] << 8)
+            stream.advance(1)
     return handled
+
+
+def newer(stream: Input, *numbers: int) -> "list[bool]":
+    """Whether a best-effort stream takes each of these."""
+    return [stream.accept(number, b"", 0, 0) for number in numbers]
 
 
 # best effort
@@ -78,8 +82,8 @@ def take(stream: ReliableInput, number: int) -> "list[int]":
 
 def test_best_effort_numbers_count_and_wrap() -> None:
     line = Line()
-    stream = BestEffortOutput(1, 32, bytearray(b"\x81\0\0\0"))
-    stream.next = 65534
+    stream = Output(1, 32, bytearray(b"\x81\0\0\0"))
+    stream.next = stream.first = stream.sent = 65534
     for _ in range(4):
         assert fill(stream)
         stream.flush(line.send, 0)
@@ -89,7 +93,7 @@ def test_best_effort_numbers_count_and_wrap() -> None:
 
 def test_best_effort_packs_until_the_mtu() -> None:
     line = Line()
-    stream = BestEffortOutput(1, 32, bytearray(b"\x81\0\0\0"))
+    stream = Output(1, 32, bytearray(b"\x81\0\0\0"))
     assert fill(stream, 5)  # 4 + 4 + 5 = 13
     assert fill(stream, 8)  # 16 + 4 + 8 = 28
     assert not fill(stream, 1)  # 28 + 4 + 1 = 33
@@ -100,7 +104,7 @@ def test_best_effort_packs_until_the_mtu() -> None:
 
 
 def test_best_effort_refuses_what_never_fits() -> None:
-    stream = BestEffortOutput(1, 32, bytearray(b"\x81\0\0\0"))
+    stream = Output(1, 32, bytearray(b"\x81\0\0\0"))
     assert stream.capacity() == 24
     assert fill(stream, 24)
     stream.reset()
@@ -108,20 +112,17 @@ def test_best_effort_refuses_what_never_fits() -> None:
 
 
 def test_best_effort_takes_only_what_is_newer() -> None:
-    stream = BestEffortInput(1)
-    assert [stream.accept(n) for n in (0, 0, 1, 5, 4, 6)] == [NOW, DROP, NOW, NOW, DROP, NOW]
+    stream = Input(1)
+    assert newer(stream, 0, 0, 1, 5, 4, 6) == [True, False, True, True, False, True]
     assert stream.lost == 3
-    stream.last = 65535
-    assert stream.accept(65535) == DROP
-    assert stream.accept(65000) == DROP
-    assert stream.accept(0) == NOW
+    stream.expected = 0
+    assert newer(stream, 65535, 65000, 0) == [False, False, True]
 
 
 def test_best_effort_half_the_numbers_are_newer() -> None:
-    stream = BestEffortInput(1)
-    stream.last = 0
-    assert stream.accept(0x8000) == DROP
-    assert stream.accept(0x7FFF) == NOW
+    stream = Input(1)
+    stream.expected = 1
+    assert newer(stream, 0x8000, 0x7FFF) == [False, True]
 
 
 # reliable, as sender
@@ -130,9 +131,9 @@ def test_best_effort_half_the_numbers_are_newer() -> None:
 def test_history_must_be_a_power_of_two() -> None:
     for wrong in (0, 3, 5, 0x8000):
         with raises(ValueError):
-            ReliableOutput(0x80, 32, bytearray(4), wrong, 100)
+            Output(0x80, 32, bytearray(4), wrong, 100)
         with raises(ValueError):
-            ReliableInput(0x80, 32, wrong)
+            Input(0x80, 32, wrong)
 
 
 def test_a_full_history_takes_no_more() -> None:
@@ -254,19 +255,18 @@ def test_repeated_nacks_are_held_off() -> None:
     assert stream.resends == 3
 
 
-def test_heartbeats_while_anything_is_unacknowledged() -> None:
+def test_a_heartbeat_is_due_a_period_after_sending_and_after_each_acknowledgement() -> None:
     line = Line()
     stream = output(history=4, mtu=16)
-    assert not stream.heartbeat_due(10_000)
     fill(stream)
-    assert not stream.heartbeat_due(10_000)
+    fill(stream)
     stream.flush(line.send, 10_000)
-    assert not stream.heartbeat_due(10_099)
-    assert stream.heartbeat_due(10_100)
-    assert not stream.heartbeat_due(10_150)
-    assert stream.heartbeat_due(10_200)
-    stream.acknowledge(1, 0, line.send, 10_201)
-    assert not stream.heartbeat_due(20_000)
+    assert stream.due == 10_100
+    fill(stream)
+    stream.flush(line.send, 10_050)
+    assert stream.due == 10_100
+    stream.acknowledge(1, 0, line.send, 10_070)
+    assert stream.due == 10_170
 
 
 def test_reset_begins_with_number_0() -> None:
@@ -277,7 +277,6 @@ def test_reset_begins_with_number_0() -> None:
     stream.flush(line.send, 0)
     stream.reset()
     assert stream.idle()
-    assert stream.free() == 4
     line.messages = []
     fill(stream)
     stream.flush(line.send, 0)
@@ -307,7 +306,6 @@ def test_sending_does_not_allocate() -> None:
         buf[at] = 7
         stream.flush(quiet, 5)
         stream.acknowledge(stream.next, 0, quiet, 6)
-        stream.heartbeat_due(7)
 
     assert allocates(call) == 0
 
@@ -352,11 +350,12 @@ def test_duplicates_are_dropped() -> None:
 
 def test_outside_the_window_is_dropped() -> None:
     stream = receiver(window=16, start=65530)
-    assert stream.accept((65530 + 16) & 0xFFFF) == DROP
-    assert stream.accept(65529) == DROP
-    assert stream.accept(0x7000) == DROP
+    for number in (65530 + 16, 65529, 0x7000):
+        assert take(stream, number) == []
     assert stream.missing() == 0
-    assert stream.accept((65530 + 15) & 0xFFFF) == LATER
+    assert stream.stored == 0
+    take(stream, 65530 + 15)
+    assert stream.stored == 1 << 15
 
 
 def test_missing_names_every_hole() -> None:
@@ -417,7 +416,8 @@ def test_heartbeat_gives_messages_up() -> None:
         assert stream.expected == (start + 3) & 0xFFFF
         assert stream.ready()
         assert stream.buf[stream.base] == (start + 3) & 255
-        assert not stream.advance()
+        stream.advance(1)
+        assert not stream.ready()
         assert stream.missing() == 0b1011  # 4, 5 and 7
         assert take(stream, start + 4) == [(start + 4) & 0xFFFF]
         assert take(stream, start + 5) == [(start + 5) & 0xFFFF, (start + 6) & 0xFFFF]
@@ -444,8 +444,7 @@ def test_reset_of_a_receiver() -> None:
 
 def test_a_message_longer_than_a_slot_stays_missing() -> None:
     stream = receiver()
-    assert stream.accept(1) == LATER
-    stream.store(1, bytes(40), 0, 40)
+    assert not stream.accept(1, bytes(40), 0, 40)
     assert stream.missing() == 0x0003
     assert take(stream, 0) == [0]
     assert take(stream, 1) == [1]
@@ -453,6 +452,6 @@ def test_a_message_longer_than_a_slot_stays_missing() -> None:
 
 def test_a_window_of_one() -> None:
     stream = receiver(window=1, start=65535)
-    assert stream.accept(0) == DROP
+    assert take(stream, 0) == []
     assert take(stream, 65535) == [65535]
     assert take(stream, 0) == [0]

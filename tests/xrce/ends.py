@@ -6,10 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 from muros.xrce._types import Buffer
-from muros.xrce.inputs import BestEffortInput, ReliableInput
-from muros.xrce.outputs import ReliableOutput
+from muros.xrce.constants import HANDLED, LATER
+from muros.xrce.inputs import Input
+from muros.xrce.outputs import Output
 from muros.xrce.queues import QueuedReliableInput, QueuedReliableOutput
-from muros.xrce.session import HANDLED, LATER, SessionCore
+from muros.xrce.session import SessionCore
 
 KEY = b"\xaa\xbb\xcc\xdd"
 RELIABLE = 0x80
@@ -36,9 +37,7 @@ class End(SessionCore):
         self.got: list[bytes] = []
         self.is_busy: Callable[[], bool] = lambda: False
         self.stop_at_failure = False
-        output: Any = (QueuedReliableOutput if hosts else ReliableOutput)(
-            RELIABLE, mtu, self.head, window, 100
-        )
+        output: Any = (QueuedReliableOutput if hosts else Output)(RELIABLE, mtu, self.head, window, 100)
         output.next = output.first = output.sent = start
         self.outputs[RELIABLE] = output
         self._window = window
@@ -47,14 +46,21 @@ class End(SessionCore):
 
     def make_input(self, stream_id: int) -> Any:
         """Every stream comes into being."""
-        stream: Any = BestEffortInput(stream_id)
+        stream = Input(stream_id)
         if stream_id >= RELIABLE:
-            stream = (QueuedReliableInput if self.hosts else ReliableInput)(
-                stream_id, 0xFFFF if self.hosts else self.mtu, self._window
+            stream = (
+                QueuedReliableInput(stream_id, self._window)
+                if self.hosts
+                else Input(stream_id, self.mtu, self._window)
             )
-            stream.expected = stream.end = self._start
+            stream.expected = self._start
         self.inputs[stream_id] = stream
         return stream
+
+    def has_room(self) -> bool:
+        """Whether one more message can be begun."""
+        stream = self.outputs[RELIABLE]
+        return bool((stream.next - stream.first) % NUMBERS < stream.history)
 
     def post(self, body: bytes, now: int) -> bool:
         """Sends a WRITE_DATA that fits a message; False when there is no room. (An empty one runs to the end of its
@@ -102,7 +108,7 @@ def converse(
     for now in range(0, rounds * 10, 10):
         for end, peer in ((one, other), (other, one)):
             todo = left[id(end)]
-            while todo and end.outputs[RELIABLE].free() > 0 and end.post(todo[0], now):
+            while todo and end.has_room() and end.post(todo[0], now):
                 del todo[0]
             end.resume(RELIABLE, now)
             end.flush(now)

@@ -26,7 +26,7 @@ def carry(sender: End, receiver: End, bodies: list[bytes], dice: random.Random, 
     stream = sender.outputs[RELIABLE]
     for now in range(0, 2_000_000, 10):
         if sender.hosts:
-            while todo and stream.free() > 0:
+            while todo and sender.has_room():
                 stream.post(todo.pop(0), sender.send, now)
         else:
             while todo or cutter is not None:

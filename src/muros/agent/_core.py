@@ -40,7 +40,9 @@ from muros.xrce._types import Buffer
 from muros.xrce.constants import (
     CREATE_CLIENT,
     DELETE,
+    FAILED,
     GET_INFO,
+    HANDLED,
     INFO,
     KIND_CLIENT,
     KIND_DATAREADER,
@@ -55,7 +57,6 @@ from muros.xrce.constants import (
     TIMESTAMP,
     TIMESTAMP_REPLY,
 )
-from muros.xrce.session import FAILED, HANDLED
 
 __all__ = ["AgentCore", "Outlet", "Port"]
 
@@ -503,10 +504,8 @@ class AgentCore:
     def _see_twins(self, session: AgentSession, port: Port, address: Hashable) -> None:
         """Two devices with one client key take the session from each other again and again."""
         if (
-            port is session.port
-            and address == session.address
-            or self.now - session.heard > self.limits.silent
-        ):
+            port is session.port and address == session.address
+        ) or self.now - session.heard > self.limits.silent:
             session.moves = 0
             return
         session.moves += 1

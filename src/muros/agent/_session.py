@@ -23,9 +23,12 @@ from muros.xrce._types import Buffer
 from muros.xrce.constants import (
     CREATE,
     DELETE,
+    FAILED,
     FORMAT_MASK,
+    HANDLED,
     KIND_CLIENT,
     KIND_NAMES,
+    LATER,
     LITTLE_ENDIAN,
     READ_DATA,
     REPLACE,
@@ -44,10 +47,10 @@ from muros.xrce.constants import (
     WRITE_DATA,
 )
 from muros.xrce.fragments import Joiner
-from muros.xrce.inputs import BestEffortInput
+from muros.xrce.inputs import Input
 from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableInput, QueuedReliableOutput
 from muros.xrce.representation import InvalidRepresentation, Kind, parse_variant_untrusted
-from muros.xrce.session import FAILED, HANDLED, LATER, SessionCore
+from muros.xrce.session import SessionCore
 
 if TYPE_CHECKING:
     from muros.agent._core import AgentCore, Port
@@ -208,7 +211,7 @@ class AgentSession(SessionCore):
 
     # Streams
 
-    def make_input(self, stream_id: int) -> "BestEffortInput | QueuedReliableInput | None":
+    def make_input(self, stream_id: int) -> Input | None:
         """Any stream a client uses comes into being, up to a limit."""
         if len(self.inputs) >= self.core.limits.max_streams:
             self.core.report(
@@ -219,15 +222,15 @@ class AgentSession(SessionCore):
                 remedy="Use fewer streams, or raise max_streams.",
             )
             return None
-        stream: BestEffortInput | QueuedReliableInput
+        stream: Input
         if stream_id >= STREAM_RELIABLE:
-            stream = QueuedReliableInput(stream_id, 0xFFFF, self.core.limits.window)
+            stream = QueuedReliableInput(stream_id, self.core.limits.window)
         else:
-            stream = BestEffortInput(stream_id)
+            stream = Input(stream_id)
         self.inputs[stream_id] = stream
         return stream
 
-    def _on_fragment(self, stream: Any, buf: Buffer, at: int, n: int, last: int) -> bool:
+    def _on_fragment(self, stream: Any, buf: Buffer, at: int, n: int, last: int) -> int:
         """Takes a piece, as long as what all clients have under way stays within the limit."""
         core = self.core
         if core.joining + n > core.limits.max_joining and (

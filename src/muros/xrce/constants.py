@@ -29,6 +29,11 @@ REPLACE = 0x04
 LAST_FRAGMENT = 0x02
 FORMAT_MASK = 0x0E
 
+# What a session's handler answers to a submessage (ours, see ``session``)
+HANDLED = 0
+FAILED = 1
+LATER = 2
+
 # Streams (8.3.2.2)
 STREAM_NONE = 0
 STREAM_BEST_EFFORT = 0x01

@@ -9,19 +9,52 @@ from muros.compat import const, copy
 _FRAGMENT = const(13)
 _LITTLE_ENDIAN = const(0x01)
 _LAST_FRAGMENT = const(0x02)
+_LATER = const(2)
+_DONE = const(-1)
 _HEAD = const(4)
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.xrce._types import Buffer
-    from muros.xrce.outputs import ReliableOutput
+    from muros.xrce.inputs import Input
+    from muros.xrce.outputs import Output
+    from muros.xrce.session import SessionCore
+
+
+def take(session: "SessionCore", stream: "Input", buf: "Buffer", at: int, n: int, last: int) -> int:
+    """Takes a piece for ``session`` and handles what is whole with it; ``LATER`` when that has to wait."""
+    joiner = stream.fragments
+    if joiner is None:
+        joiner = stream.fragments = Joiner(session.largest, stream.stream_id)
+    if joiner.add(buf, at, n, last):
+        held = session._submessages(joiner.data, joiner.at, len(joiner.data), joiner)
+        if held != _DONE:
+            joiner.at = held
+            return _LATER
+    elif last:
+        session.malformed += 1
+        if joiner.too_long:
+            session.too_long(stream.stream_id, joiner.too_long)
+    if last:
+        joiner.clear()
+    return 0
 
 
 class Joiner:
-    """Joins the pieces of one submessage; at most ``limit`` bytes are kept, a longer one is passed over whole."""
+    """Joins the pieces of one submessage; at most ``limit`` bytes are kept, a longer one is passed over whole.
 
-    def __init__(self, limit: int) -> None:
+    What is in a joined submessage is handled as if it had come on a stream that carries no fragments.
+    """
+
+    reliable = False
+
+    def __init__(self, limit: int, stream_id: int = 0) -> None:
         self.limit = limit
+        self.stream_id = stream_id
+        self.clear()
+
+    def clear(self) -> None:
+        """Ready for the next submessage."""
         self.data = bytearray()
         self.whole = False
         self.at = 0  # where handling goes on in data
@@ -42,14 +75,6 @@ class Joiner:
             self.whole = bool(last)
         return self.whole
 
-    def clear(self) -> None:
-        """Ready for the next submessage."""
-        self.data = bytearray()
-        self.whole = False
-        self.at = 0
-        self.too_long = 0
-        self.torn = False
-
     def tear(self) -> None:
         """Messages are missing now: a submessage that has begun is passed over to its end."""
         torn = self.torn or self.too_long > 0 or (len(self.data) > 0 and not self.whole)
@@ -64,7 +89,7 @@ class Cutter:
         self.data = data
         self.done = 0
 
-    def pump(self, stream: "ReliableOutput") -> bool:
+    def pump(self, stream: "Output") -> bool:
         """Puts as many pieces into ``stream`` as it has room for; whether the last one is in."""
         total = len(self.data)
         while self.done < total:

@@ -7,16 +7,20 @@ more than its window: the rest waits in order, so that nothing accepted is lost.
 from collections import deque
 
 from muros.xrce._types import Buffer, Send
-from muros.xrce.inputs import ReliableInput
-from muros.xrce.outputs import BestEffortOutput, ReliableOutput
+from muros.xrce.inputs import Input
+from muros.xrce.outputs import Output
 
 _FRAGMENT = 13
 _LITTLE_ENDIAN = 0x01
 _LAST_FRAGMENT = 0x02
 
 
-class QueuedBestEffortOutput(BestEffortOutput):
+class QueuedBestEffortOutput(Output):
     """Sends each submessage at once, in a message of its own."""
+
+    def __init__(self, stream_id: int, mtu: int, head: bytearray) -> None:
+        super().__init__(stream_id, 0, head)
+        self.mtu = mtu
 
     def post(self, submessage: bytes, send: Send, now: int) -> bool:
         """Sends ``submessage`` (header and payload); False when it does not fit the MTU."""
@@ -25,21 +29,19 @@ class QueuedBestEffortOutput(BestEffortOutput):
         if n > self.mtu:
             return False
         number = self.next
-        self.next = number + 1 & 0xFFFF
+        self.first = self.sent = self.next = number + 1 & 0xFFFF
         send(bytes((head[0], self.stream_id, number & 255, number >> 8)) + head[4:] + submessage, 0, n)
         return True
 
-    def _make(self, mtu: int) -> None:
-        self.buf = bytearray()
 
-
-class QueuedReliableOutput(ReliableOutput):
+class QueuedReliableOutput(Output):
     """Keeps messages until they are acknowledged, ``history`` of them in flight, the others waiting."""
 
     def __init__(self, stream_id: int, mtu: int, head: bytearray, history: int, period: int) -> None:
-        super().__init__(stream_id, mtu, head, history, period)
         self._kept: deque[bytes] | None = None
         self._waiting: deque[bytes] | None = None
+        super().__init__(stream_id, 0, head, history, period)
+        self.mtu = mtu
 
     def post(self, submessage: bytes, send: Send, now: int) -> bool:
         """Takes a submessage (header and payload), cut into FRAGMENTs where it does not fit a message."""
@@ -64,8 +66,14 @@ class QueuedReliableOutput(ReliableOutput):
         return len(self._waiting) if self._waiting else 0
 
     def acknowledge(self, first: int, bitmap: int, send: Send, now: int) -> bool:
-        """As in ``ReliableOutput``; what waits moves into the room that was made."""
+        """As in ``Output``; what waits moves into the room that was made."""
         known = super().acknowledge(first, bitmap, send, now)
+        kept = self._kept
+        if kept is not None:
+            for _ in range(len(kept) - (self.next - self.first & 0xFFFF)):
+                kept.popleft()
+            if not kept:
+                self._kept = None
         waiting = self._waiting
         if waiting:
             while waiting and (self.next - self.first & 0xFFFF) < self.history:
@@ -78,9 +86,6 @@ class QueuedReliableOutput(ReliableOutput):
         """Begins again with number 0; every kept or waiting message is dropped."""
         super().reset()
         self._kept = self._waiting = None
-
-    def _make(self, mtu: int) -> None:
-        self.buf = bytearray()
 
     def _append(self, submessage: bytes, send: Send, now: int) -> None:
         if self._waiting or (self.next - self.first & 0xFFFF) >= self.history:
@@ -104,22 +109,21 @@ class QueuedReliableOutput(ReliableOutput):
 
     def _transmit(self, number: int, send: Send) -> None:
         if self._kept is not None:
-            message = self._kept[number - self.first & 0xFFFF]
+            message = self._kept[-(self.next - number & 0xFFFF)]
             send(message, 0, len(message))
 
-    def _release(self, count: int) -> None:
-        kept = self._kept
-        if kept is None:
-            return
-        if count >= len(kept):
-            self._kept = None
-        else:
-            for _ in range(count):
-                kept.popleft()
 
+class QueuedReliableInput(Input):
+    """Keeps early messages as bytes, of any length."""
 
-class QueuedReliableInput(ReliableInput):
-    """Keeps early messages as bytes, of any length up to ``mtu``."""
+    def __init__(self, stream_id: int, window: int) -> None:
+        self._early: dict[int, bytes] = {}
+        super().__init__(stream_id, 0, window)
+
+    def reset(self) -> None:
+        """Expects number 0 again; kept messages are dropped."""
+        super().reset()
+        self._early.clear()
 
     def store(self, number: int, buf: Buffer, off: int, n: int) -> None:
         """Keeps a message that came early, or the expected one while it is held."""
@@ -134,25 +138,9 @@ class QueuedReliableInput(ReliableInput):
         self.size = len(self.buf)
         return True
 
-    def advance(self) -> bool:
-        """The expected message is handled. Whether the next one is kept."""
+    def advance(self, count: int) -> None:
+        """The next ``count`` messages are handled or given up."""
+        super().advance(count)
         if self._early:
-            self._early.pop(self.expected, None)
-        return super().advance()
-
-    def announce(self, first: int, last: int) -> None:
-        """As in ``ReliableInput``; what was kept before ``first`` is dropped."""
-        super().announce(first, last)
-        for number in [n for n in self._early if not self.stored >> (n - self.expected & 0xFFFF) & 1]:
-            del self._early[number]
-
-    def reset(self) -> None:
-        """Expects number 0 again; kept messages are dropped."""
-        super().reset()
-        self._early.clear()
-
-    def _make(self, mtu: int, window: int) -> None:
-        self._early: dict[int, bytes] = {}
-        self.buf = b""
-        self.base = 0
-        self.size = 0
+            for number in [n for n in self._early if not self.stored >> (n - self.expected & 0xFFFF) & 1]:
+                del self._early[number]
