@@ -23,6 +23,8 @@ HOST_ONLY = frozenset(
         "muros/client/hosts.py",
         "muros/client/reasons.py",
         "muros/rclc/_types.py",
+        "muros/rclc/hosts.py",
+        "muros/rclc/middleware.py",
         "muros/xrce/_crc.py",
         "muros/xrce/_types.py",
         "muros/xrce/constants.py",

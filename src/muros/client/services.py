@@ -87,7 +87,7 @@ class _Service(Entity):
             session.state == CONNECTED
             and session.backlog is None
             and self.todo == 0
-            and (self.stream is not stream or stream.free() > 0)
+            and (self.stream is not stream or stream.next - stream.first & 0xFFFF < stream.history)
         )
 
     def reading(self) -> bytes:

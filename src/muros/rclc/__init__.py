@@ -7,10 +7,10 @@
     Executor(context).spin()
 
 The same source runs on MicroPython and on CPython. Names are imported when they are first used, so that a board loads
-only what its program needs.
+only what its program needs. Hosts have classes that check more and say more, see ``hosts``.
 """
 
-from muros.compat import const
+from muros.compat import MPY, const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -27,12 +27,20 @@ if TYPE_CHECKING:
     from muros.rclc.service import Service as Service
     from muros.rclc.subscription import Subscription as Subscription
     from muros.rclc.timer import Timer as Timer
+    from muros.rclc.triggers import all_of as all_of
+    from muros.rclc.triggers import any_of as any_of
+    from muros.rclc.triggers import one as one
 
 _MODULES = (
     "Context context CapacityError errors InvalidNameError errors RclError errors Executor executor "
     "GuardCondition guard register middleware Node node Client service Service service Subscription subscription "
-    "Timer timer"
+    "Timer timer all_of triggers any_of triggers one triggers"
 )
+if not MPY:
+    _MODULES = (
+        "Client hosts Context hosts Executor hosts Node hosts Service hosts Subscription hosts " + _MODULES
+    )
+    __all__ = ["Qos"] + _MODULES.split()[::2]
 
 
 def __getattr__(name: str) -> object:

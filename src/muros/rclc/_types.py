@@ -51,6 +51,7 @@ class Middleware(Protocol):
 
     state: int
     on_state: Callable[[int], object] | None
+    on_problem: Callable[[int, str], object] | None
 
     def participant(self, name: str, domain: int = 0, /) -> Any:
         """A node."""
@@ -101,6 +102,9 @@ class Middleware(Protocol):
 
     def deadline(self, now: int, /) -> int:
         """Milliseconds until ``spin_once`` is wanted."""
+
+    def ping(self, timeout: int, clock: Callable[[], int], /) -> bool:
+        """Whether the other side answers within ``timeout`` ms of ``clock``."""
 
     def close(self) -> None:
         """Ends."""

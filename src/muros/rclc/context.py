@@ -15,19 +15,14 @@ STATES = ("WAITING", "CONNECTING", "CONNECTED", "LOST")
 
 
 class Context:
-    """A way into the ROS graph: a transport to an agent, a session of your own making, or a URL.
+    """A way into the ROS graph: a transport to an agent, or a session of your own making.
 
-    ``Context(Udp("192.168.1.10"))``, ``Context(Session(Udp("192.168.1.10"), queue=8))``, ``Context("local:")``.
-    ``client_key`` is for a session that is made here; a random one if it is None. Raises ValueError for a URL that
-    no middleware is registered for.
+    ``Context(Udp("192.168.1.10"))``, ``Context(Session(Udp("192.168.1.10"), queue=8))``. ``client_key`` is for a
+    session that is made here; a random one if it is None. On hosts ``muros.rclc.Context`` is a subclass, see ``hosts``.
     """
 
     def __init__(self, way: "Any", client_key: "int | bytes | None" = None, domain_id: int = 0) -> None:
-        if isinstance(way, str):
-            from muros.rclc.middleware import open_url
-
-            way = open_url(way, domain_id)
-        elif not hasattr(way, "participant"):
+        if not hasattr(way, "participant"):
             from muros.client.session import Session
 
             way = Session(way, client_key)
@@ -51,6 +46,17 @@ class Context:
     def on_state(self, callback: "Callable[[str], object]") -> None:
         """Calls ``callback(state)`` at each change."""
         self.middleware.on_state = lambda state: callback(STATES[state])
+
+    def on_problem(self, callback: "Callable[[int, str], object]") -> None:
+        """Calls ``callback(code, text)`` when something was dropped or refused, or no agent is reached.
+
+        Without it hosts print the text on standard error.
+        """
+        self.middleware.on_problem = callback
+
+    def ping(self, timeout: float = 1.0) -> bool:
+        """Whether the agent answers within ``timeout`` seconds and knows us; messages wait meanwhile."""
+        return self.middleware.ping(int(timeout * 1000), self.clock)
 
     def close(self) -> None:
         """Takes leave of the graph; executors end."""

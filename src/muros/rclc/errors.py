@@ -17,6 +17,6 @@ class CapacityError(RclError):
 
 
 class InvalidNameError(ValueError):
-    """A name that is not made as ROS asks."""
+    """A name that is not made as ROS asks; on hosts ``code`` tells topics and services from nodes."""
 
     code = _NODE_INVALID_NAME

@@ -22,6 +22,7 @@ def open_url(url: str, domain_id: int) -> "Middleware":
     make = _engines.get(scheme)
     if make is None:
         raise ValueError(
-            "%r: no middleware for %s: is registered; give a transport or a session" % (url, scheme)
+            "%r: no middleware for %s: is registered. Go through an agent: Context(Udp('127.0.0.1', 8888))"
+            % (url, scheme)
         )
     return make(url, domain_id)

@@ -20,7 +20,7 @@ class Node:
     """A node of a context. Topics and services are named relative to ``namespace`` unless they begin with a slash.
 
     Message types are generated classes, ``Int32`` or ``AddTwoInts``. ``qos`` is a profile's name or a ``Qos``.
-    What is made here raises ValueError for names that are too long.
+    What is made here raises InvalidNameError for names that ROS does not take, ValueError for those too long.
     """
 
     def __init__(self, context: "Context", name: str, namespace: str) -> None:
@@ -105,7 +105,9 @@ class Node:
         return topic_name("rt", self._resolve(name))
 
     def _resolve(self, name: str) -> str:
-        return resolve(name, self.namespace, self.name)
+        full = resolve(name, self.namespace, self.name)
+        _check(full[1:])
+        return full
 
 
 def _check(name: str) -> None:

@@ -1,0 +1,369 @@
+"""rclc on hosts: what boards have, and checks of what is asked for. Wrong use is said at once, in one line.
+
+Errors are TypeErrors and ValueErrors whose ``code`` is the return code of the C library. Boards have no room for this.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from muros.client import reasons
+from muros.client.hosts import Session
+from muros.rclc import context as context_
+from muros.rclc import executor as executor_
+from muros.rclc import node as node_
+from muros.rclc import service as service_
+from muros.rclc import subscription as subscription_
+from muros.rclc.errors import InvalidNameError, RclError
+from muros.rclc.middleware import open_url
+
+if TYPE_CHECKING:
+    from muros.client.qos import Qos
+    from muros.rclc._types import Publisher as AnyPublisher
+    from muros.rclc.timer import Timer
+    from muros.xrce._types import Buffer
+
+MALFORMED = 12
+"""The code with which a subscription tells ``on_problem`` of its first malformed sample."""
+
+Made = TypeVar("Made", "Client", "Service", "Subscription")
+
+_INVALID_ARGUMENT = 11
+_TOPIC_NAME_INVALID = 103
+_SERVICE_NAME_INVALID = 104
+_LARGEST_DOMAIN = 232
+
+
+class WrongTypeError(TypeError):
+    """Something of another kind was expected."""
+
+    code = _INVALID_ARGUMENT
+
+
+class WrongValueError(ValueError):
+    """A value that makes no sense."""
+
+    code = _INVALID_ARGUMENT
+
+
+class Context(context_.Context):
+    """A way into the ROS graph: a transport to an agent, a session of your own making, or a URL.
+
+    ``Context(Udp("192.168.1.10"))``, ``Context(Session(Udp("192.168.1.10"), queue=8))``. ``client_key`` is for a
+    session that is made here; a random one if it is None. URLs are for middlewares that were registered with
+    ``muros.rclc.register``; this version brings none. Raises TypeError and ValueError.
+    """
+
+    def __init__(self, way: Any, client_key: int | bytes | None = None, domain_id: int = 0) -> None:
+        if not isinstance(domain_id, int) or not 0 <= domain_id <= _LARGEST_DOMAIN:
+            raise WrongValueError(f"domain_id is {domain_id!r}: it must be from 0 to {_LARGEST_DOMAIN}")
+        if isinstance(way, str):
+            way = open_url(way, domain_id)
+        elif isinstance(way, type) or not (hasattr(way, "participant") or hasattr(way, "receive")):
+            raise WrongTypeError(f"Context needs a transport such as Udp('192.168.1.10', 8888), not {way!r}")
+        elif not hasattr(way, "participant"):
+            way = Session(way, client_key)
+        elif client_key is not None:
+            raise WrongTypeError("client_key belongs to the session: Context(Session(transport, client_key))")
+        super().__init__(way, None, domain_id)
+        self.services: dict[str, Service] = {}
+
+    def node(self, name: str, namespace: str = "") -> Node:
+        """A node. Raises InvalidNameError."""
+        return Node(self, name, namespace)
+
+
+class Node(node_.Node):
+    """A node of a context; see ``muros.rclc.node.Node``. Raises TypeError and ValueError for what cannot be made."""
+
+    context: Context
+
+    def __init__(self, context: Context, name: str, namespace: str) -> None:
+        _be_text(name, "the name of a node")
+        _be_text(namespace, "a namespace")
+        try:
+            super().__init__(context, name, namespace)
+        except InvalidNameError:
+            raise
+        except ValueError as error:
+            raise InvalidNameError(f"node {error}") from None
+
+    def publisher(self, kind: Any, topic: str, qos: str | Qos = "default") -> Publisher:
+        """A publisher: ``publish(message)`` returns whether the message was taken."""
+        _be_message(kind)
+        return Publisher(super().publisher(kind, topic, qos), kind)
+
+    def subscription(
+        self, kind: Any, topic: str, callback: Callable[[Any], object] | None, qos: str | Qos = "default"
+    ) -> Subscription:
+        """A subscription; an executor calls ``callback(message)``."""
+        _be_message(kind)
+        if callback is not None:  # an executor may give one
+            _be_callable(callback, "the callback of a subscription")
+        name = self._topic(topic)
+        made = Subscription(self.context, kind, callback, qos)
+        made.topic = topic
+        reader = self.context.middleware.reader
+        return self._join(made, lambda: reader(self.participant, name, kind.TYPE, qos, made.deliver))
+
+    def timer(self, period: float, callback: Callable[[], object], autostart: bool = True) -> Timer:
+        """A timer; an executor calls ``callback()`` every ``period`` seconds, to the millisecond."""
+        if not isinstance(period, int | float) or not math.isfinite(period) or period < 0:
+            raise WrongValueError(
+                f"the period of a timer is {period!r}: it must be a number of seconds, at least 0"
+            )
+        _be_callable(callback, "the callback of a timer")
+        return super().timer(period, callback, autostart)
+
+    def service(
+        self, kind: Any, name: str, callback: Callable[[Any], Any], qos: str | Qos = "services"
+    ) -> Service:
+        """A server of a service; ``callback(request)`` returns the response, or None to answer later."""
+        _be_service(kind)
+        _be_callable(callback, "the callback of a service")
+        full = self._resolve(name)
+        made = Service(self.context, kind, callback)
+        made.name = full
+        replier = self.context.middleware.replier
+        self._join(made, lambda: replier(self.participant, made.name, kind.TYPE, made.deliver, qos))
+        self.context.services[made.name] = made
+        return made
+
+    def client(self, kind: Any, name: str, qos: str | Qos = "services") -> Client:
+        """A client of a service."""
+        _be_service(kind)
+        full = self._resolve(name)
+        made = Client(self.context, kind)
+        made.name = full
+        requester = self.context.middleware.requester
+        return self._join(made, lambda: requester(self.participant, made.name, kind.TYPE, made.deliver, qos))
+
+    def _join(self, handle: Made, make: Callable[[], Any]) -> Made:
+        """Gives a handle its entity; one that cannot be made leaves nothing behind."""
+        try:
+            handle.entity = make()
+        except Exception:
+            self.context.handles.remove(handle)
+            raise
+        self.entities.append(handle)
+        return handle
+
+    def _topic(self, name: str) -> str:
+        try:
+            return super()._topic(name)
+        except ValueError as error:
+            raise _invalid(error, _TOPIC_NAME_INVALID) from None
+
+    def _resolve(self, name: str) -> str:
+        _be_text(name, "the name of a topic or service")
+        try:
+            return super()._resolve(name)
+        except ValueError as error:
+            raise _invalid(error, _SERVICE_NAME_INVALID) from None
+
+
+class Publisher:
+    """Made by ``Node.publisher``. Everything but ``publish`` is that of the middleware's writer."""
+
+    def __init__(self, writer: AnyPublisher, kind: Any) -> None:
+        self._writer = writer
+        self._kind = kind
+
+    def publish(self, message: Any) -> bool:
+        """Sends a message; False when it was not taken. Raises TypeError for one of another type."""
+        if not isinstance(message, self._kind) and not _fits(message, self._kind):
+            raise _other(message, self._kind, "publish")
+        return self._writer.publish(message)
+
+    def destroy(self) -> None:
+        """Takes it away."""
+        self._writer.destroy()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._writer, name)
+
+
+class Subscription(subscription_.Subscription):
+    """Made by ``Node.subscription``; its first malformed sample is a problem that is told."""
+
+    topic = ""
+
+    def deliver(self, buf: Buffer, off: int, n: int) -> None:
+        """Takes a sample of the middleware."""
+        malformed = self.malformed
+        super().deliver(buf, off, n)
+        if self.malformed > malformed == 0:
+            said = (
+                f"a sample of {n} B on {self.topic!r} is no {self._kind.TYPE} and was dropped. "
+                "Does somebody publish another type there?"
+            )
+            tell = self.context.middleware.on_problem
+            if tell is None:
+                reasons.say(said)
+            else:
+                tell(MALFORMED, said)
+
+
+class Service(service_.Service):
+    """Made by ``Node.service``; see ``muros.rclc.service.Service``."""
+
+    name = ""
+    context: Context
+
+    def reply(self, identity: bytes, response: Any) -> None:
+        """Answers a request. Raises TypeError for what is no response of this service."""
+        if not _fits(response, self._kind.Response):
+            raise WrongTypeError(
+                f"service {self.name!r} was answered with {response!r}. Its callback returns "
+                f"{_called(self._kind)}.Response(...), or None to answer later."
+            )
+        super().reply(identity, response)
+
+    def destroy(self) -> None:
+        """Takes it away."""
+        self.context.services.pop(self.name, None)
+        super().destroy()
+
+
+class Client(service_.Client):
+    """Made by ``Node.client``; see ``muros.rclc.service.Client``."""
+
+    name = ""
+    context: Context
+
+    def send(
+        self, request: Any, on_reply: Callable[[Any], object], timeout: float = service_._TIMEOUT
+    ) -> bool:
+        """Sends a request; an executor calls ``on_reply(response)``, with None after ``timeout`` seconds.
+
+        False when the request was not taken. Raises TypeError for a request of another type.
+        """
+        if not _fits(request, self._kind.Request):
+            raise _other(request, self._kind.Request, "send")
+        _be_callable(on_reply, "on_reply")
+        return super().send(request, on_reply, timeout)
+
+    def call(self, request: Any, timeout: float = service_._TIMEOUT) -> Any:
+        """Sends a request and waits for its response; None when it does not come within ``timeout`` seconds.
+
+        Not for callbacks, nor for a service of the same context: those run in an executor, where ``send`` belongs.
+        Raises RclError for the latter.
+        """
+        if self.name in self.context.services:
+            raise RclError(
+                f"service {self.name!r} is served by this very context, which does not run during call(). "
+                "Use send(request, on_reply) and an executor."
+            )
+        return super().call(request, timeout)
+
+
+class Executor(executor_.Executor):
+    """Runs the handles of a context; see ``muros.rclc.executor.Executor``.
+
+    Ctrl-C ends ``spin`` and ``spin_period``: they take leave of the graph and return.
+    """
+
+    def __init__(
+        self,
+        context: context_.Context,
+        handles: int = 0,
+        trigger: Callable[[list[Any]], bool] | None = None,
+    ) -> None:
+        if not isinstance(context, context_.Context):
+            raise WrongTypeError(f"Executor needs a context, not {context!r}")
+        if not isinstance(handles, int) or handles < 0:
+            raise WrongValueError(
+                f"handles is {handles!r}: it must be how many may be added, or 0 for any number"
+            )
+        if trigger is not None:
+            _be_callable(trigger, "trigger")
+        super().__init__(context, handles, trigger)
+
+    def add(self, handle: Any, callback: Callable[..., object] | None = None) -> None:
+        """Runs a handle from now on, behind those added before; with ``callback`` in place of its own.
+
+        Raises CapacityError when the executor is full.
+        """
+        if isinstance(handle, type) or not (hasattr(handle, "ready") and hasattr(handle, "run")):
+            raise WrongTypeError(
+                f"an executor cannot run {handle!r}: add subscriptions, timers, services, clients, guard conditions"
+            )
+        if callback is not None:
+            _be_callable(callback, "the callback of a handle")
+        super().add(handle, callback)
+
+    def spin(self) -> None:
+        """Runs until the context is closed or Ctrl-C is pressed."""
+        try:
+            super().spin()
+        except KeyboardInterrupt:
+            self.context.close()
+
+    def spin_period(self, period: float) -> None:
+        """Makes one pass each ``period`` seconds, until the context is closed or Ctrl-C is pressed."""
+        if not isinstance(period, int | float) or not 0 < period < math.inf:
+            raise WrongValueError(f"period is {period!r}: it must be a number of seconds above 0")
+        try:
+            super().spin_period(period)
+        except KeyboardInterrupt:
+            self.context.close()
+
+
+def _be_text(name: Any, what: str) -> None:
+    if not isinstance(name, str):
+        raise WrongTypeError(f"{what} is a str, not {name!r}")
+
+
+def _be_callable(callback: Any, what: str) -> None:
+    if not callable(callback):
+        raise WrongTypeError(f"{what} is a function, not {callback!r}")
+
+
+def _be_message(kind: Any) -> None:
+    if isinstance(kind, type) and hasattr(kind, "TYPE"):
+        if hasattr(kind, "write"):
+            return
+        raise WrongTypeError(f"{kind.TYPE} is no message: topics carry messages such as std_msgs/msg/Int32")
+    raise _no_class(kind, "a message class such as std_msgs.msg.Int32")
+
+
+def _be_service(kind: Any) -> None:
+    if isinstance(kind, type) and hasattr(kind, "TYPE"):
+        if hasattr(kind, "Request") and hasattr(kind, "Response"):
+            return
+        raise WrongTypeError(f"{kind.TYPE} is no service such as example_interfaces/srv/AddTwoInts")
+    raise _no_class(kind, "a service class such as example_interfaces.srv.AddTwoInts")
+
+
+def _no_class(kind: Any, wanted: str) -> WrongTypeError:
+    if hasattr(kind, "TYPE"):
+        return WrongTypeError(f"give {wanted}: the class {_called(type(kind))} itself, not an object of it")
+    return WrongTypeError(f"give {wanted}, not {kind!r}")
+
+
+def _fits(message: Any, kind: Any) -> bool:
+    """Whether a message is of a type, by whatever class, or a sample without type that is serialised already."""
+    if isinstance(message, type):
+        return False
+    if hasattr(message, "TYPE"):
+        return bool(message.TYPE == kind.TYPE)
+    return hasattr(message, "size") and hasattr(message, "write")
+
+
+def _other(message: Any, kind: Any, verb: str) -> WrongTypeError:
+    got = message.TYPE if hasattr(message, "TYPE") else repr(message)
+    return WrongTypeError(f"{verb} takes {kind.TYPE} here, not {got}")
+
+
+def _called(kind: Any) -> str:
+    name: str = kind.__name__
+    return name
+
+
+def _invalid(error: ValueError, code: int) -> InvalidNameError:
+    """The same error as one about names, with a code of its own."""
+    made = InvalidNameError(str(error))
+    made.code = code
+    return made
