@@ -2,10 +2,10 @@
 
 Sequence numbers only grow, so a dictionary holds the samples in their order, and the lowest one held is a number
 that only moves up: finding, adding and dropping cost the same however much is kept. Of each instance (one for
-all samples of a topic without a key) the last `depth` samples are kept, or all of them.
+all samples of a topic without a key) the last `depth` samples are kept, or all of them. Their numbers stand in plain
+lists: most are short, and there may be thousands.
 """
 
-from collections import deque
 from collections.abc import Iterator
 
 from muros.rtps._endpoint import NEVER
@@ -54,8 +54,8 @@ class History:
             raise ValueError(f"history depth is {depth}; it must be at least 1, or None to keep all")
         self.depth = depth
         self._samples: dict[int, Sample] = {}
-        self._instances: dict[bytes, deque[int]] = {}
-        self._ending: deque[Sample] = deque()
+        self._instances: dict[bytes, list[int]] = {}
+        self._ending: list[Sample] = []
         self._first = 1
 
     def __len__(self) -> int:
@@ -88,10 +88,10 @@ class History:
         if self.depth is not None:
             numbers = self._instances.get(sample.instance)
             if numbers is None:
-                numbers = self._instances[sample.instance] = deque()
+                numbers = self._instances[sample.instance] = []
             numbers.append(sample.sequence)
             if len(numbers) > self.depth:
-                self._samples.pop(numbers.popleft(), None)
+                self._samples.pop(numbers.pop(0), None)
         if sample.last:
             self._ending.append(sample)
 
@@ -104,7 +104,7 @@ class History:
         """Everybody knows the samples up to `sequence`: forget the instances that end there."""
         ending = self._ending
         while ending and ending[0].sequence <= sequence:
-            end = ending.popleft()
+            end = ending.pop(0)
             if end.sequence in self._samples:
                 self._end(end)
 

@@ -2,8 +2,10 @@
 
 from muros.rtps._endpoint import Send
 from muros.rtps._reader_proxy import ReaderProxy
+from muros.rtps._values import EntityId
+from muros.rtps._wire import gap, split_numbers
 
-__all__ = ["Allowance", "Packet"]
+__all__ = ["Allowance", "Packet", "gaps"]
 
 
 class Allowance:
@@ -63,3 +65,14 @@ class Packet:
                 self._send(self._submessages, self._proxy.prefix, place)
             self._submessages = []
             self._filled = 0
+
+
+def gaps(reader: EntityId, writer: EntityId, gone: list[int]) -> list[bytes]:
+    """GAPs for these rising numbers: as few as they fit (DDSI-RTPS 2.3, 8.3.7.4)."""
+    submessages = []
+    for base, numbers in split_numbers(gone):
+        end = base + 1
+        while end - base < len(numbers) and numbers[end - base] == end:
+            end += 1
+        submessages.append(gap(reader, writer, base, end, numbers[end - base :]))
+    return submessages

@@ -16,7 +16,6 @@ nothing for `patience` in that situation is set aside: it holds nobody any more,
 is when it returns.
 """
 
-from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Final
 
@@ -25,7 +24,7 @@ from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, newer
 from muros.rtps._fragments import fragments_of
 from muros.rtps._history import History, Sample
 from muros.rtps._reader_proxy import ReaderProxy
-from muros.rtps._sending import Allowance, Packet
+from muros.rtps._sending import Allowance, Packet, gaps
 from muros.rtps._settings import WRITER_DEFAULTS, WriterSettings
 from muros.rtps._values import EntityId, Guid, GuidPrefix, split_guid
 from muros.rtps._wire import (
@@ -37,7 +36,6 @@ from muros.rtps._wire import (
     gap,
     heartbeat,
     info_ts,
-    split_numbers,
 )
 
 __all__ = ["WriterCore"]
@@ -118,7 +116,7 @@ class WriterCore:
         self._lagging: dict[ReaderProxy, None] = {}  # those that do not
         self._repairing: dict[ReaderProxy, None] = {}  # those that want something again
         self._routes: tuple[Place, ...] = ()  # every place where a reader listens, once
-        self._unsent: deque[int] = deque()  # samples waiting to leave
+        self._unsent: list[int] = []  # samples waiting to leave
         self._leaving: Sample | None = None  # the first of them, when part of it has left:
         self._cursor = 0  # so many of its fragments
         self._allowance = Allowance(settings.burst, settings.pace)
@@ -379,7 +377,7 @@ class WriterCore:
                         self._send(submessages, None, place)
             self._leaving = None
             self._cursor = 0
-            unsent.popleft()
+            del unsent[0]
         if not self._lagging:
             self._release(now)
 
@@ -404,7 +402,7 @@ class WriterCore:
                     self._allowance.spend(len(content) * len(proxy.places))
                 else:
                     self._repair_fragments(packet, proxy, sample, fragments, now)
-            for submessage in self._gaps(proxy, sorted(gone)):
+            for submessage in gaps(proxy.entity, self._entity, sorted(gone)):
                 packet.add(submessage)
             if not proxy.wanted:
                 self._repairing.pop(proxy, None)
@@ -441,16 +439,6 @@ class WriterCore:
             return True
         self._at = min(self._at, now + self.settings.pace)
         return False
-
-    def _gaps(self, proxy: ReaderProxy, gone: list[int]) -> list[bytes]:
-        """GAPs for these rising numbers."""
-        submessages = []
-        for base, numbers in split_numbers(gone):
-            end = base + 1
-            while end - base < len(numbers) and numbers[end - base] == end:
-                end += 1
-            submessages.append(gap(proxy.entity, self._entity, base, end, numbers[end - base :]))
-        return submessages
 
     # --- Heartbeats --------------------------------------------------------------------------------------
 
