@@ -349,7 +349,7 @@ def _fits(message: Any, kind: Any) -> bool:
         return False
     if hasattr(message, "TYPE"):
         return bool(message.TYPE == kind.TYPE)
-    return hasattr(message, "size") and hasattr(message, "write")
+    return callable(getattr(message, "size", None))
 
 
 def _other(message: Any, kind: Any, verb: str) -> WrongTypeError:
