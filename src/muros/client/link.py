@@ -11,8 +11,8 @@ Theory of operation. The connection walks through four states, by the table ``_N
 
 A CREATE_CLIENT that the network repeats or delays makes the reference agent begin its streams again behind our back.
 Such a session is out of step: the agent acknowledges numbers of another one. When it waits for number 0 although that
-is acknowledged and later messages came, or says ``_FOREIGN`` times in a row what cannot be, the session connects
-again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2, 8.3.5 and 8.4.
+is acknowledged and later messages came, or says ``_FOREIGN`` times in a row what cannot be, and for longer than an
+old acknowledgement may be under way, the session connects again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2, 8.3.5 and 8.4.
 """
 
 from struct import pack_into
@@ -56,6 +56,7 @@ _STREAM_RELIABLE = const(0x80)
 _SOON = const(250)  # ms between attempts while an agent is expected back
 _SLOWLY = const(5000)  # ms until a refused session asks again
 _TRIES = const(4)  # unanswered attempts to connect again until we wait
+_OLDEST = const(2000)  # ms: older acknowledgements than this do not come
 _FOREIGN = const(8)
 
 _PROBLEM_SESSION = const(1)
@@ -103,6 +104,7 @@ class Link(SessionCore):
         self._heard = 0
         self._tries = 0
         self._ping = 0  # the request id of the question that is open
+        self._suspected = 0
         self._probe = 0  # the number of a message that tells whether the agent's streams began again, plus 1
 
     def spin_once(self, now: "int | None" = None) -> int:
@@ -230,21 +232,29 @@ class Link(SessionCore):
         super()._on_acknack(buf, at, flags)
         if self.foreign == 0:
             self._probe = 0
-        elif buf[at] == 0 and buf[at + 1] == 0:
+            return
+        if self.foreign == 1:
+            self._suspected = self.now
+        if buf[at] == 0 and buf[at + 1] == 0:
             missing = buf[at + 2] << 8 | buf[at + 3]
             if self._probe == 0:
                 self._suspect()
-            elif missing >> self._probe - 2 & 1 or (self._probe > 16 and missing == 0):
+            elif missing >> self._probe - 1 & 1 or (self._probe > 16 and missing == 0):
                 self.foreign = _FOREIGN
+                self._suspected = ticks_add(self.now, -_OLDEST)
 
     def _suspect(self) -> None:
-        """The agent may have begun its streams again: a message on the reliable one has it tell its numbers.
+        """The agent may have begun its streams again: two messages have it tell its numbers.
 
-        An acknowledgement that waits for number 0 may be old; one that knows of this message is not.
+        An acknowledgement that waits for number 0 may be old. The first of the two is held back until it is asked
+        for, so that only an agent which has the second and lacks all before can say that the first is missing.
         """
         stream = self.outputs[_STREAM_RELIABLE]
-        if stream.first:
+        stream.flush(self.send, self.now)
+        if stream.first and (stream.next - stream.first & 0xFFFF) + 1 < stream.history:
             self._probe = stream.next + 1
+            self.submit(_GET_INFO, _LITTLE_ENDIAN, self.requests(1), _OBJECT_AGENT, b"\2\0\0\0")
+            stream.flush(_nowhere, self.now)
         self.submit(_GET_INFO, _LITTLE_ENDIAN, self.requests(1), _OBJECT_AGENT, b"\2\0\0\0")
 
     def _is_due(self, now: int, again: int) -> bool:
@@ -274,7 +284,7 @@ class Link(SessionCore):
             self._ask()
 
     def _watch(self, now: int) -> None:
-        if self.foreign >= _FOREIGN:
+        if self.foreign >= _FOREIGN and ticks_diff(now, self._suspected) >= _OLDEST:
             self.foreign = 0
             self.happened(_UNKNOWN)
             self.problem(_PROBLEM_OUT_OF_STEP)
@@ -319,3 +329,7 @@ class Link(SessionCore):
         else:
             self.problem(_PROBLEM_SESSION, status)
             self._due = ticks_add(self.now, _SLOWLY)
+
+
+def _nowhere(buf: "Buffer", off: int, n: int) -> None:
+    """Where a message goes that is held back."""
