@@ -12,7 +12,8 @@ Theory of operation. The connection walks through four states, by the table ``_N
 A CREATE_CLIENT that the network repeats or delays makes the reference agent begin its streams again behind our back.
 Such a session is out of step: the agent acknowledges numbers of another one. When it waits for number 0 although that
 is acknowledged and later messages came, or says ``_FOREIGN`` times in a row what cannot be, and for longer than an
-old acknowledgement may be under way, the session connects again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2, 8.3.5 and 8.4.
+old acknowledgement may be under way, the session connects again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2,
+8.3.5 and 8.4.
 """
 
 from struct import pack_into
