@@ -53,7 +53,7 @@ def test_an_option_that_does_not_exist() -> None:
 def test_a_participant_whose_name_is_too_long() -> None:
     session = Session(Udp("127.0.0.1"))
     session.participant("/" + "x" * 58)
-    with pytest.raises(ValueError, match="is too long: 60 characters as /x+, at most 59"):
+    with pytest.raises(ValueError, match=r"is too long: 60 characters as /x+, at most 59"):
         session.participant("/" + "x" * 59)
 
 

@@ -24,7 +24,7 @@ STEP = 10
 SPIN = 50
 """A client spins when something has come, and so often."""
 EXPECTED = (5, 7, 8, 9, 11)
-"""Problems that storms bring: no answer or no agent for a while, and samples that are not taken now and are written again."""
+"""Problems that storms bring: no answer or no agent for a while, samples that are not taken now and written again."""
 KEEP_ALL = Qos(reliable=True, keep_all=True)
 
 

@@ -35,6 +35,8 @@ from muros.agent._options import (
 )
 from muros.links import LinkError, devices_from_file
 
+DEFAULT_LIMITS: Final = Limits()
+
 DOMAIN_OVERRIDE: Final = "XRCE_DOMAIN_ID_OVERRIDE"
 """Environment variable: the domain of clients that ask for domain 255."""
 
@@ -79,7 +81,7 @@ class AgentOptions:
     color: bool | None = None
     """None: if the output is a terminal."""
     log_style: str = "muros"
-    limits: Limits = Limits()
+    limits: Limits = DEFAULT_LIMITS
     """The limits of the agent, with what was said about them."""
     domain_override: int | None = None
     """The domain of clients that ask for domain 255; None: 255 is a domain like others."""
@@ -164,7 +166,7 @@ class _Given:
 
     links: list[_Place] = field(default_factory=list)
     agent: dict[str, Value] = field(default_factory=dict)
-    limits: Limits = Limits()
+    limits: Limits = DEFAULT_LIMITS
 
 
 def _read_words(words: list[str], given: _Given) -> None:
