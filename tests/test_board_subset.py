@@ -231,7 +231,7 @@ def test_every_module_compiles_for_boards() -> None:
 
 def test_host_only_modules_exist() -> None:
     gone = [path for path in HOST_ONLY if not (SOURCES / path).is_file()]
-    assert not gone, f"HOST_ONLY in tests/micropython/tree.py names what is not there: {gone}"
+    assert not gone, f"HOST_ONLY in src/muros/cli/_floor.py names what is not there: {gone}"
 
 
 def test_boards_load_no_host_only_module() -> None:

@@ -14,6 +14,7 @@ INTERRUPTED = 130
 
 COMMANDS = {
     "agent": ("muros.cli.agent", "connect DDS-XRCE clients, such as boards that speak micro-ROS"),
+    "board": ("muros.cli.board", "write the files that a MicroPython board needs"),
     "interface": ("muros.cli.interface", "show, list and generate message, service and action types"),
 }
 """Sub-commands: the module, which has `run(argv) -> int` or `register(subparsers)` for argparse, and its help."""

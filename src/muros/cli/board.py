@@ -1,0 +1,101 @@
+"""The command ``muros board``: what a MicroPython board needs, in one folder."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+DESCRIPTION = """\
+Write the modules of muros that boards use, and the classes of the types you name with all that they need, into a
+folder, ready to be copied to the library folder of a MicroPython board.
+"""
+EPILOG = """\
+Name all types of your program at once: muros board copy build/board std_msgs/msg/Int32 sensor_msgs/msg/Imu
+With --mpy the files are compiled by mpy-cross: they take less memory to import, and less flash. Native code for
+serial lines is compiled for --march, as armv6m, armv7emsp, xtensawin, rv32imc or x64, and left out without.
+"""
+
+
+def register(subparsers: Any) -> None:
+    """Adds ``board`` with its own sub-commands to an argparse sub-command table."""
+    parser = subparsers.add_parser("board", help="write the files that a MicroPython board needs")
+    actions = parser.add_subparsers(required=True, metavar="copy")
+    copy = actions.add_parser(
+        "copy",
+        help="write the files that a MicroPython board needs into a folder",
+        description=DESCRIPTION,
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    copy.add_argument("folder", metavar="DIR", type=Path, help="made if it is not there")
+    copy.add_argument("types", nargs="*", metavar="TYPE", help="std_msgs/msg/Int32, or short std_msgs/Int32")
+    copy.add_argument("--mpy", action="store_true", help="compile with mpy-cross")
+    copy.add_argument("--march", metavar="ARCH", help="with --mpy: native code for this architecture")
+    copy.add_argument(
+        "--path",
+        action="append",
+        default=[],
+        metavar="DIR",
+        help="folder of your definitions, for types of your own",
+    )
+    copy.set_defaults(run=_copy)
+
+
+def _copy(arguments: argparse.Namespace) -> int:
+    from muros import interfaces
+    from muros.cli import _floor
+
+    if arguments.march and not arguments.mpy:
+        print("muros: --march is for compiling: give --mpy too", file=sys.stderr)
+        return 2
+    try:
+        for folder in arguments.path:
+            interfaces.add_path(folder)
+        tree = _floor.board_tree() | _types(arguments.types)
+        left_out = [path for path in tree if _floor.is_native(tree[path])] if arguments.mpy else []
+        if arguments.mpy:
+            tree = _floor.compiled(tree, arguments.march)
+        _replace(tree, arguments.folder)
+    except (interfaces.InterfaceError, _floor.CompileError) as error:
+        print(f"muros: {error}", file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f"muros: {error.filename or arguments.folder}: {error.strerror}", file=sys.stderr)
+        return 1
+    _report(tree, arguments.folder)
+    if left_out and not arguments.march:
+        print(
+            f"Left out: native code ({', '.join(left_out)}). --march ARCH adds it; serial lines work without."
+        )
+    return 0
+
+
+def _types(names: list[str]) -> dict[str, bytes]:
+    from muros.interfaces import board
+
+    return {path: text.encode() for path, text in board.sources(names).items()}
+
+
+def _replace(tree: dict[str, bytes], folder: Path) -> None:
+    """Writes the files; what is compiled must not stand beside its source, which boards would take instead."""
+    from muros.cli import _floor
+
+    _floor.write(tree, folder)
+    for path in tree:
+        other = ".py" if path.endswith(".mpy") else ".mpy"
+        (folder / path).with_suffix(other).unlink(missing_ok=True)
+
+
+def _report(tree: dict[str, bytes], folder: Path) -> None:
+    sizes: dict[str, list[int]] = {}
+    for path, content in tree.items():
+        sizes.setdefault(path.split("/")[0], []).append(len(content))
+    width = max(map(len, sizes))
+    for package, parts in sizes.items():
+        print(f"{package:<{width}}  {sum(parts):>7,} B in {len(parts)} files")
+    print(f"{'all':<{width}}  {sum(map(len, tree.values())):>7,} B")
+    print("Copy it to a board, for instance with mpremote (first make the folder, unless it is there):")
+    print("  mpremote fs mkdir :lib")
+    print(f"  mpremote fs cp -r {' '.join(str(folder / package) for package in sizes)} :lib/")
