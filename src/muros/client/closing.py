@@ -6,7 +6,8 @@ from muros.xrce.create import head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
-    from muros.client._types import Deliver
+    from typing import Any
+
     from muros.client.entities import Entity
     from muros.client.session import Session
     from muros.xrce._types import Buffer
@@ -63,15 +64,16 @@ def close(session: "Session") -> None:
     except OSError:
         pass
     transport.close()
-    session.transport = Closed()
-    session.send = session.transport.send
+    closed: "Any" = Closed()
+    session.transport = closed
+    session.send = closed.send
     session.up = False
     session.login = True
     session.enter(WAITING)
 
 
 class Closed:
-    """The transport of a session that was closed."""
+    """What a session that was closed has in place of its transport."""
 
     mtu = 0
 
@@ -79,15 +81,7 @@ class Closed:
         """Never."""
         return False
 
-    def close(self) -> None:
-        """Is closed."""
+    close = open
 
     def send(self, buf: "Buffer", off: int, n: int) -> None:
         """Drops the message."""
-
-    def receive(self, deliver: "Deliver") -> int:
-        """Nothing comes."""
-        return 0
-
-    def wait(self, timeout: int) -> None:
-        """There is nothing to wait for."""

@@ -7,7 +7,7 @@ yet, of ``asked`` that its request is under way; ``steps`` itself stands for the
 
 from muros.client.link import CONNECTED
 from muros.client.names import dds_type, topic_name
-from muros.client.qos import profile
+from muros.client.qos import profile, within
 from muros.compat import const, ticks_add
 from muros.xrce.create import head
 
@@ -26,6 +26,7 @@ _LITTLE_ENDIAN = const(0x01)
 _CREATE_FLAGS = const(0x07)  # little endian, REUSE and REPLACE
 _FIRST_REQUEST = const(10)
 _KIND_PARTICIPANT = const(1)
+_LAST_DOMAIN = const(255)  # which leaves the choice to the agent; the others end at 232
 _KIND_TOPIC = const(2)
 _KIND_DATAWRITER = const(5)
 _QOS_RELIABLE = const(0x01)
@@ -161,6 +162,7 @@ class Participant(Entity):
     """A DDS participant."""
 
     def __init__(self, session: "Session", name: str, domain: int) -> None:
+        within("domain", domain, _LAST_DOMAIN)
         self.index = session.index(_KIND_PARTICIPANT)
         self.domain = domain
         super().__init__(session, topic_name("", name))

@@ -19,9 +19,12 @@ if TYPE_CHECKING:
     from typing import Unpack
 
     from muros.client._types import Options, Transport
+    from muros.xrce._types import Buffer
 
+_INDICES = 4096
 _SILENCE = 3000  # ms without an answer until that is told
 _SILENT = "silent"
+_DELETE = 3
 _LEAST_MTU = 64
 _LARGEST_MTU = 65535 + 4
 _LONGEST_LIVELINESS = 999_999  # ms: the property has six digits
@@ -81,6 +84,11 @@ class Session(board.Session):
         except Exception as error:
             self.raised = error
 
+    def index(self, kind: int) -> int:
+        """A new index for an object of a kind; when each was used, that of a deleted one. ValueError for none."""
+        unused = _unused(self, kind) if self.counts[kind] == _INDICES else None
+        return unused[0] if unused else super().index(kind)
+
     def _is_due(self, now: int, again: int) -> bool:
         if (self._due is None or now >= self._due) and self.state != CONNECTED and self.transport.mtu:
             self._attempt_again(now)  # the transport of a closed session has no MTU
@@ -122,6 +130,27 @@ def _check(
             raise ValueError(f"{name} is {value!r}: it must be an integer of at least {least}")
     if options.get("hard_liveliness", 0) > _LONGEST_LIVELINESS:
         raise ValueError(f"hard_liveliness is {options['hard_liveliness']}: at most {_LONGEST_LIVELINESS} ms")
+
+
+def _unused(session: board.Session, kind: int) -> list[int]:
+    """The indices that no object of a kind has, nor one whose DELETE is not acknowledged."""
+    used = {entity.object_id(step) for entity in session.entities for step in range(entity.steps)}
+
+    def deleted(buf: Buffer, off: int, n: int) -> None:
+        """Takes the DELETEs out of ``n`` bytes of submessages."""
+        pos = 0
+        while pos + 8 <= n:
+            at = off + pos
+            if buf[at] == _DELETE:
+                used.add(buf[at + 6] << 8 | buf[at + 7])
+            pos += 4 + (buf[at + 2] | buf[at + 3] << 8) + 3 & ~3
+
+    size = len(session.head)
+    session.reliable.unacknowledged(lambda buf, off, n: deleted(buf, off + size, n - size))
+    if session.backlog is not None:
+        for data in session.backlog.items:
+            deleted(data, 0, len(data))
+    return [index for index in range(_INDICES) if index << 4 | kind not in used]
 
 
 def _remember(session: Session) -> None:

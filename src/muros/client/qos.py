@@ -10,13 +10,15 @@ if TYPE_CHECKING:
 
 _RELIABLE = const(0x01)
 _KEEP_LAST = const(0x02)
+_LONGEST = const(0xFFFFFFFF)  # ms
 _DURABILITIES = ("volatile", "transient_local", "transient", "persistent")
 
 
 class Qos:
     """What a writer offers or a reader asks for. Times are in ms, 0 means none; depth 0 leaves it to the agent.
 
-    Raises ValueError for a durability that does not exist.
+    Raises ValueError for a durability that does not exist, and for numbers that are negative or that the wire has no
+    room for: a depth of 65536, a time of 2**32.
     """
 
     def __init__(
@@ -30,6 +32,9 @@ class Qos:
     ) -> None:
         if durability not in _DURABILITIES:
             raise ValueError("durability is one of " + ", ".join(_DURABILITIES))
+        within("depth", depth, 0xFFFF)
+        within("deadline", deadline, _LONGEST)
+        within("lifespan", lifespan, _LONGEST)
         self.flags = (4 << _DURABILITIES.index(durability)) & ~4
         if reliable:
             self.flags |= _RELIABLE
@@ -38,6 +43,12 @@ class Qos:
         self.depth = 0 if keep_all else depth
         self.deadline = deadline
         self.lifespan = lifespan
+
+
+def within(name: str, value: int, last: int) -> None:
+    """Raises ValueError unless ``value`` is an integer from 0 to ``last``."""
+    if not isinstance(value, int) or not 0 <= value <= last:
+        raise ValueError("%s is %r: it must be an integer from 0 to %d" % (name, value, last))
 
 
 def profile(name: "str | Qos") -> Qos:

@@ -35,6 +35,7 @@ _STREAM_BEST_EFFORT = const(0x01)
 _STREAM_RELIABLE = const(0x80)
 _OBJECT_CLIENT = const(0xFFFE)
 _MADE = const(1)
+_INDICES = const(4096)
 
 NO_READER = const(3)
 
@@ -100,12 +101,12 @@ class Session(Link):
         self.backlog: "Backlog | None" = None
         self.pending = 0  # entities that are not whole yet
         self.waiting = 0  # requests without a STATUS
-        self._counts = bytearray(9)  # the next index for each kind of object
+        self.counts = array("H", bytearray(18))  # the next index for each kind of object
         self.late = 0  # the tick when those are made again
         self.laps = 0  # how often that happened since the last STATUS
 
     def participant(self, name: str, domain: int = 0) -> "Participant":
-        """A DDS participant, the node of ROS. ValueError for a name longer than 59 characters."""
+        """A DDS participant, the node of ROS. ValueError for a name longer than 59 characters, or for no domain."""
         from muros.client.entities import Participant
 
         return Participant(self, name, domain)
@@ -191,9 +192,11 @@ class Session(Link):
         return made
 
     def index(self, kind: int) -> int:
-        """A new index for an object of a kind; each is used once."""
-        index = self._counts[kind]
-        self._counts[kind] = index + 1
+        """A new index for an object of a kind. ValueError after the last; hosts use those of deleted objects again."""
+        index = self.counts[kind]
+        if index == _INDICES:
+            raise ValueError("no room for one more: a session has at most 4096 objects of a kind")
+        self.counts[kind] = index + 1
         return index
 
     def add(self, entity: "Entity") -> None:

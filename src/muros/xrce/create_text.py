@@ -22,6 +22,8 @@ _KIND_REQUESTER = const(7)
 _QOS_RELIABLE = const(0x01)
 _QOS_KEEP_LAST = const(0x02)
 _QOS_TRANSIENT_LOCAL = const(0x08)
+_MILLION = const(1000000)
+_DURABILITIES = ("TRANSIENT_LOCAL", "TRANSIENT", "PERSISTENT")  # flags 8, 16 and 32
 
 
 class Xml:
@@ -29,12 +31,12 @@ class Xml:
 
     def participant(self, name: str, domain: int) -> bytes:
         """A participant with a name, in a domain."""
-        text = "<dds><participant><rtps><name>" + name + "</name></rtps></participant></dds>"
+        text = _tag("dds", _tag("participant", _tag("rtps", _tag("name", name))))
         return participant_by_text(_AS_XML, text, domain)
 
     def topic(self, name: str, type_name: str, parent: int) -> bytes:
         """A topic of a participant."""
-        text = "<dds><topic>" + _names(name, type_name) + "</topic></dds>"
+        text = _tag("dds", _tag("topic", _names(name, type_name)))
         return by_text(_KIND_TOPIC, _AS_XML, text, parent)
 
     def group(self, kind: int, parent: int) -> bytes:
@@ -45,22 +47,24 @@ class Xml:
         self, kind: int, topic_id: int, qos: "EndpointQos", parent: int, name: str, type_name: str
     ) -> bytes:
         """A datawriter or a datareader."""
-        tag = "data_writer>" if kind == _KIND_DATAWRITER else "data_reader>"
-        text = (
-            "<dds><"
-            + tag
-            + "<historyMemoryPolicy>PREALLOCATED_WITH_REALLOC</historyMemoryPolicy><qos><reliability>"
-        )
-        text += "<kind>RELIABLE</kind>" if qos.flags & _QOS_RELIABLE else "<kind>BEST_EFFORT</kind>"
-        text += "</reliability>"
-        if qos.flags & _QOS_TRANSIENT_LOCAL:
-            text += "<durability><kind>TRANSIENT_LOCAL</kind></durability>"
-        text += "</qos><topic><kind>NO_KEY</kind>" + _names(name, type_name) + "<historyQos><kind>"
-        text += "KEEP_LAST" if qos.flags & _QOS_KEEP_LAST else "KEEP_ALL"
-        text += "</kind>"
+        qualities = _kind("reliability", "RELIABLE" if qos.flags & _QOS_RELIABLE else "BEST_EFFORT")
+        durability = qos.flags // _QOS_TRANSIENT_LOCAL & 7
+        if durability:
+            qualities += _kind("durability", _DURABILITIES[durability >> 1])
+        if qos.deadline:
+            qualities += _tag("deadline", _time("period", qos.deadline))
+        if qos.lifespan:
+            qualities += _tag("lifespan", _time("duration", qos.lifespan))
+        history = _tag("kind", "KEEP_LAST" if qos.flags & _QOS_KEEP_LAST else "KEEP_ALL")
         if qos.flags & _QOS_KEEP_LAST and qos.depth:
-            text += "<depth>" + str(qos.depth) + "</depth>"
-        return by_text(kind, _AS_XML, text + "</historyQos></topic></" + tag + "</dds>", parent)
+            history += _tag("depth", str(qos.depth))
+        text = (
+            _tag("historyMemoryPolicy", "PREALLOCATED_WITH_REALLOC")
+            + _tag("qos", qualities)
+            + _tag("topic", _tag("kind", "NO_KEY") + _names(name, type_name) + _tag("historyQos", history))
+        )
+        text = _tag("data_writer" if kind == _KIND_DATAWRITER else "data_reader", text)
+        return by_text(kind, _AS_XML, _tag("dds", text), parent)
 
     def service(
         self,
@@ -74,12 +78,16 @@ class Xml:
     ) -> bytes:
         """A requester or a replier."""
         tag = "requester" if kind == _KIND_REQUESTER else "replier"
-        text = "<dds><" + tag + ' profile_name="' + str(parent >> 4) + "_" + str(kind)
-        text += '" service_name="' + name + '" request_type="' + request_type + '" reply_type="' + reply_type
-        text += (
-            '"><request_topic_name>' + request_topic + "</request_topic_name><reply_topic_name>" + reply_topic
+        text = '<dds><%s profile_name="%d_%d" service_name="%s" request_type="%s" reply_type="%s">' % (
+            tag,
+            parent >> 4,
+            kind,
+            name,
+            request_type,
+            reply_type,
         )
-        return by_text(kind, _AS_XML, text + "</reply_topic_name></" + tag + "></dds>", parent)
+        text += _tag("request_topic_name", request_topic) + _tag("reply_topic_name", reply_topic)
+        return by_text(kind, _AS_XML, text + "</" + tag + "></dds>", parent)
 
 
 class Reference(Xml):
@@ -108,8 +116,20 @@ def _profile(topic_name: str) -> str:
     return topic_name[3:] if topic_name.startswith("rt/") else topic_name
 
 
+def _tag(name: str, inner: str) -> str:
+    return "<" + name + ">" + inner + "</" + name + ">"
+
+
+def _kind(name: str, kind: str) -> str:
+    return _tag(name, _tag("kind", kind))
+
+
+def _time(name: str, ms: int) -> str:
+    return _tag(name, _tag("sec", str(ms // 1000)) + _tag("nanosec", str(ms % 1000 * _MILLION)))
+
+
 def _names(name: str, type_name: str) -> str:
-    return "<name>" + name + "</name><dataType>" + type_name + "</dataType>"
+    return _tag("name", name) + _tag("dataType", type_name)
 
 
 def participant_by_text(form: int, text: str, domain: int) -> bytes:
