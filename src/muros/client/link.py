@@ -63,8 +63,6 @@ _FOREIGN = const(8)
 _PROBLEM_SESSION = const(1)
 _PROBLEM_OUT_OF_STEP = const(2)
 _PROBLEM_UNREACHABLE = const(9)
-_PROBLEM_LARGEST = const(10)
-_TOO_LONG = const(4)
 
 
 class Link(SessionCore):
@@ -162,12 +160,6 @@ class Link(SessionCore):
                 tell(self, code, value, what)
         except Exception as error:
             self.raised = error
-
-    def too_long(self, stream_id: int, n: int) -> None:
-        """A sample that came was larger than ``largest``."""
-        from muros.client.backlog import dropped
-
-        dropped(self, _TOO_LONG, _PROBLEM_LARGEST, n)
 
     def work(self, now: int) -> None:
         """What there is to do while CONNECTING or CONNECTED."""

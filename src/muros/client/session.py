@@ -35,6 +35,8 @@ _STREAM_BEST_EFFORT = const(0x01)
 _STREAM_RELIABLE = const(0x80)
 _OBJECT_CLIENT = const(0xFFFE)
 _MADE = const(1)
+_TOO_LONG = const(4)
+_PROBLEM_LARGEST = const(10)
 _INDICES = const(4096)
 
 NO_READER = const(3)
@@ -227,6 +229,12 @@ class Session(Link):
     def defer(self, writer: "Any", message: "Outgoing", n: int) -> bool:
         """What becomes of a sample that cannot go out now: it is queued, cut up, or refused and counted."""
         return self.keep().defer(writer, message, n)
+
+    def too_long(self, stream_id: int, n: int) -> None:
+        """A sample that came was larger than ``largest``."""
+        from muros.client.backlog import dropped
+
+        dropped(self, _TOO_LONG, _PROBLEM_LARGEST, n)
 
     def keep(self) -> "Backlog":
         """The backlog, made at the first need."""
