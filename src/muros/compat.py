@@ -36,7 +36,7 @@ if MPY:
     except ImportError:  # a build without a source of entropy: the time since power-on has to do
 
         def urandom(n):  # type: ignore[no-untyped-def]
-            return bytes([ticks_us() >> (3 * i) & 255 for i in range(n)])
+            return ticks_us().to_bytes(4, "little")[:n]
 
 else:
     from muros._host import *  # noqa: F403

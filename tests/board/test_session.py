@@ -339,27 +339,6 @@ def test_reset_in_a_message_begins_with_number_0() -> None:
 # LATER
 
 
-def test_later_holds_the_stream_until_resumed() -> None:
-    end = End()
-    end.answers = [HANDLED, LATER]
-    end.tell(data(0, b"a", b"b", b"c"))
-    end.tell(data(1, b"d"))
-    assert end.bodies() == [b"a"]
-    assert end.take() == [acknack(0, 0), acknack(0, 0)]
-    end.answers = [LATER]
-    end.resume(0x80, 1)
-    assert end.bodies() == []
-    end.answers = [HANDLED, HANDLED, HANDLED]
-    end.resume(0x80, 2)
-    assert end.bodies() == [b"b", b"c", b"d"]
-    assert end.take() == [acknack(0, 0), acknack(2, 0)]
-    end.resume(0x80, 3)
-    end.resume(0x90, 3)
-    end.resume(1, 3)
-    assert end.take() == []
-    assert end.bodies() == []
-
-
 def test_a_held_message_that_is_sent_again_goes_on_where_it_was() -> None:
     end = End()
     end.answers = [HANDLED, LATER, LATER]
@@ -380,18 +359,6 @@ def test_a_heartbeat_for_a_held_stream_goes_on_where_it_was() -> None:
     assert end.take() == [acknack(0, 0), acknack(1, 0)]
 
 
-def test_a_kept_message_may_be_held_too() -> None:
-    end = End()
-    end.tell(data(1, b"c", b"d", b"e"))
-    end.answers = [HANDLED, HANDLED, LATER]
-    end.tell(data(0, b"a"))
-    assert end.bodies() == [b"a", b"c"]
-    end.resume(0x80, 1)
-    assert end.bodies() == [b"d", b"e"]
-    end.tell(data(2, b"f"))
-    assert end.bodies() == [b"f"]
-
-
 def test_a_held_message_that_is_given_up_leaves_nothing() -> None:
     end = End()
     end.answers = [HANDLED, LATER]
@@ -399,29 +366,6 @@ def test_a_held_message_that_is_given_up_leaves_nothing() -> None:
     end.tell(data(2, b"c", b"d"))
     end.tell(heartbeat(2, 2))
     assert end.bodies() == [b"a", b"c", b"d"]
-
-
-def test_resuming_from_inside_goes_on_outside() -> None:
-    end = End()
-    depth = [0, 0]
-
-    def handle(kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
-        body = bytes(buf[off : off + n])
-        if body == b"b" and depth[0] == 0:
-            depth[0] = 1
-            return LATER
-        depth[1] += 1
-        assert depth[1] == 1, "nested"
-        end.got.append((kind, body, stream_id))
-        end.resume(0x80, 5)
-        depth[1] -= 1
-        return HANDLED
-
-    end._handle = handle
-    end.tell(data(0, b"a", b"b", b"c"))
-    end.tell(data(1, b"d"))
-    end.resume(0x80, 1)
-    assert end.bodies() == [b"a", b"b", b"c", b"d"]
 
 
 def test_an_error_in_a_handler_does_not_block_the_stream() -> None:
@@ -528,24 +472,6 @@ def test_a_joined_piece_cut_short_is_counted() -> None:
     end.tell(message(0x80, 2, submessage(13, b"", 3)))
     assert end.bodies() == []
     assert end.malformed == 1
-
-
-def test_later_inside_a_joined_piece() -> None:
-    end = End()
-    joined = submessage(7, b"a" * 28) + submessage(7, b"b" * 4) + submessage(7, b"c" * 4)
-    messages = pieces(joined, 0)
-    end.answers = [HANDLED, LATER, LATER, LATER]
-    for one in messages:
-        end.tell(one)
-    assert end.bodies() == [b"a" * 28]
-    end.tell(data(len(messages), b"z"))
-    end.tell(messages[-1])
-    end.resume(0x80, 1)
-    assert end.bodies() == []
-    assert end.take()[-1] == acknack(len(messages) - 1, 0)
-    end.resume(0x80, 2)
-    assert end.bodies() == [b"b" * 4, b"c" * 4, b"z"]
-    assert end.take()[-1] == acknack(len(messages) + 1, 0)
 
 
 def test_a_sample_whose_pieces_were_given_up_is_passed_over_to_its_end() -> None:

@@ -9,7 +9,7 @@ from muros.xrce._types import Buffer
 from muros.xrce.constants import HANDLED, LATER
 from muros.xrce.inputs import Input
 from muros.xrce.outputs import Output
-from muros.xrce.queues import QueuedReliableInput, QueuedReliableOutput
+from muros.xrce.queues import QueuedReliableInput, QueuedReliableOutput, resume
 from muros.xrce.session import SessionCore
 
 KEY = b"\xaa\xbb\xcc\xdd"
@@ -41,7 +41,7 @@ class End(SessionCore):
         output.next = output.first = output.sent = start
         self.outputs[RELIABLE] = output
         self._window = window
-        self._start = start
+        self._begin = start
         self.make_input(RELIABLE)
 
     def make_input(self, stream_id: int) -> Any:
@@ -53,7 +53,7 @@ class End(SessionCore):
                 if self.hosts
                 else Input(stream_id, self.mtu, self._window)
             )
-            stream.expected = self._start
+            stream.expected = self._begin
         self.inputs[stream_id] = stream
         return stream
 
@@ -110,7 +110,7 @@ def converse(
             todo = left[id(end)]
             while todo and end.has_room() and end.post(todo[0], now):
                 del todo[0]
-            end.resume(RELIABLE, now)
+            resume(end, RELIABLE, now)
             end.flush(now)
             end.heartbeats(now)
             for message in end.take():

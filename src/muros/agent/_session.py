@@ -48,7 +48,7 @@ from muros.xrce.constants import (
 )
 from muros.xrce.fragments import Joiner
 from muros.xrce.inputs import Input
-from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableInput, QueuedReliableOutput
+from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableInput, QueuedReliableOutput, resume
 from muros.xrce.representation import InvalidRepresentation, Kind, parse_variant_untrusted
 from muros.xrce.session import SessionCore
 
@@ -310,7 +310,7 @@ class AgentSession(SessionCore):
             if proxy.writer.write(bytes(buf[off + 4 : off + n])):
                 return HANDLED
             if stream_id >= STREAM_RELIABLE:
-                proxy.writer.on_room = lambda: self.resume(stream_id, self.core.now)
+                proxy.writer.on_room = lambda: resume(self, stream_id, self.core.now)
                 return LATER
             return self._dropped(
                 "reader-full",

@@ -17,11 +17,11 @@ _FLAG = const(0x7E)
 _ESCAPE = const(0x7D)
 _FLIP = const(0x20)
 
-# 16 entries, low byte first: a board has no room for the table of 256
+# For the low four bits of the CRC: a board has no room for the table of 256
 _NIBBLES = (
-    b"\x00\x00\x01\xcc\x01\xd8\x00\x14\x01\xf0\x00\x3c\x00\x28\x01\xe4"
-    b"\x01\xa0\x00\x6c\x00\x78\x01\xb4\x00\x50\x01\x9c\x01\x88\x00\x44"
-)
+    0x0000, 0xCC01, 0xD801, 0x1400, 0xF001, 0x3C00, 0x2800, 0xE401,
+    0xA001, 0x6C00, 0x7800, 0xB401, 0x5000, 0x9C01, 0x8801, 0x4400,
+)  # fmt: skip
 
 
 def crc16(buf: "Buffer", off: int, n: int, crc: int = 0) -> int:
@@ -29,10 +29,8 @@ def crc16(buf: "Buffer", off: int, n: int, crc: int = 0) -> int:
     table = _NIBBLES
     for i in range(off, off + n):
         crc ^= buf[i]
-        k = (crc & 15) << 1
-        crc = crc >> 4 ^ (table[k] | table[k + 1] << 8)
-        k = (crc & 15) << 1
-        crc = crc >> 4 ^ (table[k] | table[k + 1] << 8)
+        crc = crc >> 4 ^ table[crc & 15]
+        crc = crc >> 4 ^ table[crc & 15]
     return crc
 
 

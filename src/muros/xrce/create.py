@@ -51,13 +51,10 @@ def endpoint(
     A depth, a deadline or a lifespan (both in ms) of 0 is left to the agent. The names of the topic are needed by
     the other formats only.
     """
-    blob = pack(">HBxH", topic_id, 1, 0)[:4] + pack("<H", qos.flags)
-    if qos.depth:
-        blob += pack("<BxH", 1, qos.depth)
-    else:
-        blob += b"\0"
-    blob = _optional(_optional(blob, qos.deadline), qos.lifespan) + b"\0"
-    return _variant(kind, blob + (b"\0" if kind == _KIND_DATAWRITER else b"\0\0"), pack(">H", parent))
+    blob = pack("<BBBxH", topic_id >> 8, topic_id & 255, 1, qos.flags)
+    blob += pack("<BxH", 1, qos.depth) if qos.depth else b"\0"
+    blob = _optional(_optional(blob, qos.deadline), qos.lifespan)
+    return _variant(kind, blob + bytes(2 if kind == _KIND_DATAWRITER else 3), pack(">H", parent))
 
 
 def service(
@@ -85,10 +82,12 @@ def head(buf: bytearray, at: int, kind: int, flags: int, n: int, request: int, o
 
     A payload of 64 KiB or more has length 0: it runs to the end of the message.
     """
+    if n > 0xFFFF:
+        n = 0
     buf[at] = kind
     buf[at + 1] = flags
-    buf[at + 2] = n & 255 if n < 0x10000 else 0
-    buf[at + 3] = n >> 8 if n < 0x10000 else 0
+    buf[at + 2] = n & 255
+    buf[at + 3] = n >> 8
     buf[at + 4] = request >> 8
     buf[at + 5] = request & 255
     buf[at + 6] = object_id >> 8

@@ -5,6 +5,7 @@ reliable streams carry fragments, so the pieces come in order and none is missin
 """
 
 from muros.compat import const, copy
+from muros.xrce.session import submessages
 
 _FRAGMENT = const(13)
 _LITTLE_ENDIAN = const(0x01)
@@ -27,7 +28,7 @@ def take(session: "SessionCore", stream: "Input", buf: "Buffer", at: int, n: int
     if joiner is None:
         joiner = stream.fragments = Joiner(session.largest, stream.stream_id)
     if joiner.add(buf, at, n, last):
-        held = session._submessages(joiner.data, joiner.at, len(joiner.data), joiner)
+        held = submessages(session, joiner.data, joiner.at, len(joiner.data), joiner)
         if held != _DONE:
             joiner.at = held
             return _LATER

@@ -5,9 +5,8 @@ those that came early, within a window of ``window`` messages; ``missing()`` is 
 numbers are 16 bit, compared as RFC 1982 says; both begin at 0.
 """
 
-from array import array
-
 from muros.compat import const, copy
+from muros.xrce.outputs import sizes
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -23,8 +22,6 @@ class Input:
     come early and are kept, each up to ``mtu`` bytes."""
 
     def __init__(self, stream_id: int, mtu: int = 0, window: int = 1) -> None:
-        if window & (window - 1) or not 0 < window <= 0x4000:
-            raise ValueError("window is %d: it must be a power of two up to 16384" % window)
         self.stream_id = stream_id
         self.reliable = stream_id >= _STREAM_RELIABLE
         self.window = window
@@ -33,7 +30,7 @@ class Input:
         self.base = 0
         self.size = 0
         self._mtu = mtu
-        self._sizes = array("H", bytes(2 * window))
+        self._sizes = sizes(window)
         self.reset()
 
     def reset(self) -> None:

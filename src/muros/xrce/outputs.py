@@ -30,6 +30,13 @@ _HOLD_OFF = const(20)
 _STREAM_RELIABLE = const(0x80)
 
 
+def sizes(slots: int) -> "array[int]":
+    """The sizes of so many kept messages. ValueError when it is not a power of two, which numbers need to wrap."""
+    if slots & slots - 1 or not 0 < slots <= 0x4000:
+        raise ValueError("%d messages: it must be a power of two up to 16384" % slots)
+    return array("H", bytes(2 * slots))
+
+
 class Output:
     """A stream as its sender sees it, reliable when its id is.
 
@@ -38,8 +45,6 @@ class Output:
     """
 
     def __init__(self, stream_id: int, mtu: int, head: bytearray, history: int = 1, period: int = 0) -> None:
-        if history & (history - 1) or not 0 < history <= 0x4000:
-            raise ValueError("history is %d: it must be a power of two up to 16384" % history)
         self.stream_id = stream_id
         self.reliable = stream_id >= _STREAM_RELIABLE
         self.mtu = mtu
@@ -48,10 +53,10 @@ class Output:
         self.due = 0  # the tick of the next heartbeat, while any message is unacknowledged
         self.resends = 0
         self.buf = bytearray(mtu * history)
-        self._head = head
-        self._sizes = array("H", bytes(2 * history))
+        self._start = len(head)
+        self._sizes = sizes(history)
         for at in range(0, len(self.buf), mtu or 1):
-            self.buf[at : at + len(head)] = head
+            self.buf[at : at + self._start] = head
             self.buf[at + 1] = stream_id
         self.reset()
 
@@ -69,34 +74,35 @@ class Output:
         Writing header and payload there completes the submessage: nothing else is to be called but ``flush``.
         """
         number = self.next
-        buf = self.buf
         slot = number - 1 & self.history - 1
         at = self._sizes[slot]
         if number == self.sent or (at + 3 & ~3) + _HEAD + n > self.mtu:  # the last message takes no more
-            at = len(self._head)
+            at = self._start
             if at + _HEAD + n > self.mtu or number - self.first & 0xFFFF >= self.history:
                 return -1
-            self.next = number + 1 & 0xFFFF
             slot = number & self.history - 1
-            buf[slot * self.mtu + 2] = number & 255
-            buf[slot * self.mtu + 3] = number >> 8
+            self.next = number + 1 & 0xFFFF
+        base = slot * self.mtu
+        buf = self.buf
+        if at == self._start:
+            buf[base + 2] = number & 255
+            buf[base + 3] = number >> 8
         while at & 3:
-            buf[slot * self.mtu + at] = 0
+            buf[base + at] = 0
             at += 1
         self._sizes[slot] = at + _HEAD + n
-        return slot * self.mtu + at
+        return base + at
 
     def cancel(self, at: int) -> None:
         """Takes back the submessage that ``reserve`` gave last, before anything else was called."""
-        slot = self.next - 1 & self.history - 1
-        at -= slot * self.mtu
-        self._sizes[slot] = at
-        if at == len(self._head):
+        at %= self.mtu
+        self._sizes[self.next - 1 & self.history - 1] = at
+        if at == self._start:
             self.next = self.next - 1 & 0xFFFF
 
     def capacity(self) -> int:
         """Longest payload in bytes that a message of its own can carry."""
-        return self.mtu - len(self._head) - _HEAD
+        return self.mtu - self._start - _HEAD
 
     def idle(self) -> bool:
         """Whether everything is sent and acknowledged."""
@@ -105,16 +111,14 @@ class Output:
     def flush(self, send: "Send", now: int) -> None:
         """Sends every message not sent yet."""
         number = self.sent
-        if number == self.next:
-            return
-        if number == self.first:
-            self.due = ticks_add(now, self.period)
-        while number != self.next:
-            self.sent = number + 1 & 0xFFFF
-            self._transmit(number, send)
-            number = self.sent
-        if not self.reliable:
-            self.first = number
+        end = self.next
+        if number != end:
+            if number == self.first:
+                self.due = ticks_add(now, self.period)
+            self.sent = end
+            if not self.reliable:
+                self.first = end
+            self._transmit(number, end, send)
 
     def acknowledge(self, first: int, bitmap: int, send: "Send", now: int) -> bool:
         """Takes an ACKNACK: frees what is before ``first``, sends again what ``bitmap`` asks for (bit 0 = first).
@@ -129,29 +133,32 @@ class Output:
             self._again >>= moved
             self.due = ticks_add(now, self.period)
         if bitmap:
-            if ticks_diff(now, self._again_at) >= _HOLD_OFF:
-                self._again = 0
-            bit = 1
-            while bit <= bitmap and first != self.sent:
-                if bitmap & bit & ~self._again:
-                    self._again |= bit
-                    self._again_at = now
-                    self.resends += 1
-                    self._transmit(first, send)
-                bit <<= 1
-                first = first + 1 & 0xFFFF
+            self._resend(bitmap, send, now)
         return True
 
     def unacknowledged(self, send: "Send") -> None:
         """Shows every kept message, oldest first: ``send(buf, off, n)``."""
-        number = self.first
-        while number != self.next:
-            self._transmit(number, send)
-            number = number + 1 & 0xFFFF
+        self._transmit(self.first, self.next, send)
 
-    def _transmit(self, number: int, send: "Send") -> None:
-        slot = number & self.history - 1
-        send(self.buf, slot * self.mtu, self._sizes[slot])
+    def _resend(self, bitmap: int, send: "Send", now: int) -> None:
+        if ticks_diff(now, self._again_at) >= _HOLD_OFF:
+            self._again = 0
+        number = self.first
+        bit = 1
+        while bit <= bitmap and number != self.sent:
+            if bitmap & bit & ~self._again:
+                self._again |= bit
+                self._again_at = now
+                self.resends += 1
+                self._transmit(number, number + 1 & 0xFFFF, send)
+            number = number + 1 & 0xFFFF
+            bit <<= 1
+
+    def _transmit(self, number: int, end: int, send: "Send") -> None:
+        while number != end:
+            slot = number & self.history - 1
+            send(self.buf, slot * self.mtu, self._sizes[slot])
+            number = number + 1 & 0xFFFF
 
 
 BestEffortOutput = Output

@@ -9,10 +9,19 @@ from collections import deque
 from muros.xrce._types import Buffer, Send
 from muros.xrce.inputs import Input
 from muros.xrce.outputs import Output
+from muros.xrce.session import SessionCore, go_on
 
 _FRAGMENT = 13
 _LITTLE_ENDIAN = 0x01
 _LAST_FRAGMENT = 0x02
+
+
+def resume(session: SessionCore, stream_id: int, now: int) -> None:
+    """Goes on with a stream of ``session`` that was held by ``LATER``."""
+    stream = session.inputs.get(stream_id)
+    if stream is not None and stream.stored & 1 and not stream.busy:
+        session.now = now
+        go_on(session, stream, b"", 0, 0)
 
 
 class QueuedBestEffortOutput(Output):
@@ -21,6 +30,7 @@ class QueuedBestEffortOutput(Output):
     def __init__(self, stream_id: int, mtu: int, head: bytearray) -> None:
         super().__init__(stream_id, 0, head)
         self.mtu = mtu
+        self._head = head
 
     def post(self, submessage: bytes, send: Send, now: int) -> bool:
         """Sends ``submessage`` (header and payload); False when it does not fit the MTU."""
@@ -42,6 +52,7 @@ class QueuedReliableOutput(Output):
         self._waiting: deque[bytes] | None = None
         super().__init__(stream_id, 0, head, history, period)
         self.mtu = mtu
+        self._head = head
 
     def post(self, submessage: bytes, send: Send, now: int) -> bool:
         """Takes a submessage (header and payload), cut into FRAGMENTs where it does not fit a message."""
@@ -107,10 +118,11 @@ class QueuedReliableOutput(Output):
         self.next = self.sent = number + 1 & 0xFFFF
         send(message, 0, len(message))
 
-    def _transmit(self, number: int, send: Send) -> None:
-        if self._kept is not None:
+    def _transmit(self, number: int, end: int, send: Send) -> None:
+        while number != end and self._kept is not None:
             message = self._kept[-(self.next - number & 0xFFFF)]
             send(message, 0, len(message))
+            number = number + 1 & 0xFFFF
 
 
 class QueuedReliableInput(Input):

@@ -29,9 +29,8 @@ if TYPE_CHECKING:
 _FLAG = const(0x7E)
 _HEAD = const(4)
 _CRC = const(2)
-_CHUNK = const(64)
-
-BROADCAST = 255
+_CHUNK = const(32)  # bytes escaped at a time
+_BROADCAST = const(255)
 
 
 class SerialDeframer:
@@ -59,65 +58,48 @@ class SerialDeframer:
         self.garbage = 0
         self._local = local_address
         self._buf = bytearray(_HEAD + capacity + _CRC)
-        self._state = array("i", (0, 0, 0, 0))
+        self._state = array("i", (0, 0, _HEAD, 0))
         self._inside = False
 
     def feed(self, data: "Buffer", n: int) -> None:
         """Takes ``data[:n]``; calls ``on_frame`` for each frame that it completes."""
         state = self._state
-        buf = self._buf
         state[0] = 0
         while state[0] < n:
+            start = state[0]
+            flag = unstuff(data, n, self._buf, state)
             if not self._inside:
-                self._hunt(data, n)
-            elif unstuff(data, n, buf, state):
-                if state[1] > 0:  # two flags in a row are fill between frames, nothing is lost
-                    self.cut += 1
-                self._begin()
-            elif state[1] == state[2]:
-                self._advance()
+                self.garbage += state[0] - start - flag
+                state[1] = 0
+            elif flag and state[1]:  # two flags in a row are fill between frames, nothing is lost
+                self.cut += 1
+            if flag:
+                state[1] = state[3] = 0
+                state[2] = _HEAD
+                self._inside = True
+            elif self._inside and state[1] == state[2]:
+                self._advance(state)
 
-    def _hunt(self, data: "Buffer", n: int) -> None:
-        state = self._state
-        i = state[0]
-        start = i
-        while i < n and data[i] != _FLAG:
-            i += 1
-        self.garbage += i - start
-        if i < n:
-            self._begin()
-            i += 1
-        state[0] = i
-
-    def _begin(self) -> None:
-        state = self._state
-        state[1] = 0
-        state[2] = _HEAD
-        state[3] = 0
-        self._inside = True
-
-    def _advance(self) -> None:
-        state = self._state
+    def _advance(self, state: "array[int]") -> None:
+        """The head or the whole of a frame is there."""
         buf = self._buf
         n = buf[2] | buf[3] << 8
+        end = _HEAD + n
+        self._inside = False
         if state[2] == _HEAD:
-            if self._local >= 0 and buf[1] != self._local and buf[1] != BROADCAST:
+            if self._local >= 0 and buf[1] != self._local and buf[1] != _BROADCAST:
                 self.wrong_address += 1
-                self._inside = False
             elif n > self.capacity:
                 self.bad_length += 1
-                self._inside = False
             else:
-                state[2] = _HEAD + n + _CRC
-            return
-        self._inside = False
-        end = _HEAD + n
-        if crc16(buf, _HEAD, n) != buf[end] | buf[end + 1] << 8:
+                state[2] = end + _CRC
+                self._inside = True
+        elif crc16(buf, _HEAD, n) != buf[end] | buf[end + 1] << 8:
             self.bad_crc += 1
-            return
-        self.frames += 1
-        if self.on_frame is not None:
-            self.on_frame(buf, _HEAD, n, buf[0])
+        else:
+            self.frames += 1
+            if self.on_frame is not None:
+                self.on_frame(buf, _HEAD, n, buf[0])
 
 
 class SerialFramer:
@@ -127,39 +109,27 @@ class SerialFramer:
     """
 
     def __init__(self, source: int, destination: int, write: "Callable[[bytearray, int], object]") -> None:
-        self.source = source
-        self.destination = destination
         self._write = write
-        self._out = bytearray(2 * _CHUNK)
-        self._head = bytearray(_HEAD)
+        self._head = bytearray((source, destination, 0, 0))
+        self._out = bytearray(4 * _CHUNK + 2 * _CRC)
 
     def send(self, buf: "Buffer", off: int, n: int) -> None:
         """Sends ``buf[off:off + n]`` as one frame."""
         out = self._out
         head = self._head
-        write = self._write
-        head[0] = self.source
-        head[1] = self.destination
         head[2] = n & 255
         head[3] = n >> 8
         out[0] = _FLAG
         pos = stuff(head, 0, _HEAD, out, 1)
-        end = off + n
         crc = crc16(buf, off, n)
-        while off < end:
-            k = (len(out) - pos) >> 1
-            if k < 8:
-                write(out, pos)
+        n += off
+        while off < n:
+            if pos > 2 * _CHUNK:
+                self._write(out, pos)
                 pos = 0
-                continue
-            if k > end - off:
-                k = end - off
+            k = min(n - off, _CHUNK)
             pos = stuff(buf, off, k, out, pos)
             off += k
-        if len(out) - pos < 2 * _CRC:
-            write(out, pos)
-            pos = 0
-        head[0] = crc & 255
-        head[1] = crc >> 8
-        pos = stuff(head, 0, _CRC, out, pos)
-        write(out, pos)
+        head[2] = crc & 255
+        head[3] = crc >> 8
+        self._write(out, stuff(head, 2, _CRC, out, pos))
