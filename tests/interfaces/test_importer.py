@@ -64,7 +64,7 @@ try: import no_such_module_at_all
 except ImportError: pass
 print(sorted(name for name in sys.modules if name.startswith(("muros.", "rosbags", "numpy", "typing"))))
 """
-    assert python(program) == "['muros._importer', 'muros.compat']\n"
+    assert python(program) == "['muros._host', 'muros._importer', 'muros.compat']\n"
 
 
 def test_what_is_missing_is_explained() -> None:
