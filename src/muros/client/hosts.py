@@ -28,6 +28,7 @@ _DELETE = 3
 _LEAST_MTU = 64
 _LARGEST_MTU = 65535 + 4
 _LONGEST_LIVELINESS = 999_999  # ms: the property has six digits
+_LARGEST_HISTORY = 0x4000
 _CREATIONS = ("binary", "xml", "reference")
 _TRANSPORT = ("open", "close", "send", "receive", "wait", "mtu")
 _LEAST = {
@@ -64,7 +65,7 @@ class Session(board.Session):
         history: int = 4,
         **options: Unpack[Options],
     ) -> None:
-        _check(transport, client_key, session_id, mtu, dict(options))
+        _check(transport, client_key, session_id, mtu, history, dict(options))
         super().__init__(transport, client_key, session_id, mtu, history, **options)
         _remember(self)
 
@@ -106,7 +107,12 @@ class Session(board.Session):
 
 
 def _check(
-    transport: Any, client_key: int | bytes | None, session_id: int, mtu: int, options: dict[str, Any]
+    transport: Any,
+    client_key: int | bytes | None,
+    session_id: int,
+    mtu: int,
+    history: int,
+    options: dict[str, Any],
 ) -> None:
     """Raises TypeError or ValueError for what no session can be made of."""
     if isinstance(transport, type) or not all(hasattr(transport, name) for name in _TRANSPORT):
@@ -121,6 +127,8 @@ def _check(
     mtu = mtu or transport.mtu
     if not isinstance(mtu, int) or not _LEAST_MTU <= mtu <= _LARGEST_MTU:
         raise ValueError(f"mtu is {mtu!r}: it must be from {_LEAST_MTU} to {_LARGEST_MTU} bytes")
+    if not isinstance(history, int) or history & history - 1 or not 0 < history <= _LARGEST_HISTORY:
+        raise ValueError(f"history is {history!r}: it must be a power of two up to {_LARGEST_HISTORY}")
     creation = options.get("creation", _CREATIONS[0])
     if creation not in _CREATIONS:
         raise ValueError(f"creation is {creation!r}: it must be one of {', '.join(_CREATIONS)}")
