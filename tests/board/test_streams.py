@@ -65,10 +65,18 @@ def take(stream: Input, number: int) -> "list[int]":
     if stream.accept(number, bytes((number & 255, number >> 8)), 0, 2):
         handled.append(number)
         stream.advance(1)
-        while stream.ready():
-            assert stream.size == 2
-            handled.append(stream.buf[stream.base] | stream.buf[stream.base + 1] << 8)
-            stream.advance(1)
+        handled += kept(stream)
+    return handled
+
+
+def kept(stream: Input) -> "list[int]":
+    """The numbers of messages that are kept and in order now, and are handled."""
+    handled: "list[int]" = []
+    while stream.expected in stream.early:
+        body = stream.early[stream.expected]
+        assert len(body) == 2
+        handled.append(body[0] | body[1] << 8)
+        stream.advance(1)
     return handled
 
 
@@ -132,8 +140,6 @@ def test_history_must_be_a_power_of_two() -> None:
     for wrong in (0, 3, 5, 0x8000):
         with raises(ValueError):
             Output(0x80, 32, bytearray(4), wrong, 100)
-        with raises(ValueError):
-            Input(0x80, 32, wrong)
 
 
 def test_a_full_history_takes_no_more() -> None:
@@ -333,7 +339,7 @@ def test_any_order_within_the_window_is_handled_in_order() -> None:
             handled += take(stream, start + i)
         assert handled == [(start + i) & 0xFFFF for i in range(16)]
         assert stream.missing() == 0
-        assert stream.stored == 0
+        assert stream.early == {}
 
 
 def test_duplicates_are_dropped() -> None:
@@ -353,9 +359,9 @@ def test_outside_the_window_is_dropped() -> None:
     for number in (65530 + 16, 65529, 0x7000):
         assert take(stream, number) == []
     assert stream.missing() == 0
-    assert stream.stored == 0
+    assert stream.early == {}
     take(stream, 65530 + 15)
-    assert stream.stored == 1 << 15
+    assert list(stream.early) == [(65530 + 15) & 0xFFFF]
 
 
 def test_missing_names_every_hole() -> None:
@@ -414,10 +420,7 @@ def test_heartbeat_gives_messages_up() -> None:
         take(stream, start + 6)
         stream.announce((start + 3) & 0xFFFF, (start + 7) & 0xFFFF)
         assert stream.expected == (start + 3) & 0xFFFF
-        assert stream.ready()
-        assert stream.buf[stream.base] == (start + 3) & 255
-        stream.advance(1)
-        assert not stream.ready()
+        assert kept(stream) == [(start + 3) & 0xFFFF]
         assert stream.missing() == 0b1011  # 4, 5 and 7
         assert take(stream, start + 4) == [(start + 4) & 0xFFFF]
         assert take(stream, start + 5) == [(start + 5) & 0xFFFF, (start + 6) & 0xFFFF]
@@ -428,7 +431,7 @@ def test_heartbeat_gives_everything_up() -> None:
     take(stream, 65535)
     stream.announce(20, 19)
     assert stream.expected == 20
-    assert not stream.ready()
+    assert stream.early == {}
     assert stream.missing() == 0
     assert take(stream, 20) == [20]
 

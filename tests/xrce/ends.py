@@ -9,7 +9,7 @@ from muros.xrce._types import Buffer
 from muros.xrce.constants import HANDLED, LATER
 from muros.xrce.inputs import Input
 from muros.xrce.outputs import Output
-from muros.xrce.queues import QueuedReliableInput, QueuedReliableOutput, resume
+from muros.xrce.queues import QueuedReliableOutput, resume
 from muros.xrce.session import SessionCore
 
 KEY = b"\xaa\xbb\xcc\xdd"
@@ -48,11 +48,7 @@ class End(SessionCore):
         """Every stream comes into being."""
         stream = Input(stream_id)
         if stream_id >= RELIABLE:
-            stream = (
-                QueuedReliableInput(stream_id, self._window)
-                if self.hosts
-                else Input(stream_id, self.mtu, self._window)
-            )
+            stream = Input(stream_id, self.mtu, self._window)
             stream.expected = self._begin
         self.inputs[stream_id] = stream
         return stream

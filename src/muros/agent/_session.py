@@ -48,7 +48,7 @@ from muros.xrce.constants import (
 )
 from muros.xrce.fragments import Joiner
 from muros.xrce.inputs import Input
-from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableInput, QueuedReliableOutput, resume
+from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableOutput, resume
 from muros.xrce.representation import InvalidRepresentation, Kind, parse_variant_untrusted
 from muros.xrce.session import SessionCore
 
@@ -222,12 +222,7 @@ class AgentSession(SessionCore):
                 remedy="Use fewer streams, or raise max_streams.",
             )
             return None
-        stream: Input
-        if stream_id >= STREAM_RELIABLE:
-            stream = QueuedReliableInput(stream_id, self.core.limits.window)
-        else:
-            stream = Input(stream_id)
-        self.inputs[stream_id] = stream
+        stream = self.inputs[stream_id] = Input(stream_id, 0xFFFF, self.core.limits.window)
         return stream
 
     def _on_fragment(self, stream: Any, buf: Buffer, at: int, n: int, last: int) -> int:

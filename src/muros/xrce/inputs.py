@@ -3,10 +3,11 @@
 A best-effort receiver takes what is newer than the last. A reliable receiver handles messages in order and keeps
 those that came early, within a window of ``window`` messages; ``missing()`` is the bitmap of its ACKNACK. Sequence
 numbers are 16 bit, compared as RFC 1982 says; both begin at 0.
+
+Memory is taken for messages that came early only, and while they wait: on most lines none does.
 """
 
-from muros.compat import const, copy
-from muros.xrce.outputs import sizes
+from muros.compat import const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -18,26 +19,23 @@ _BITS = const(16)
 
 
 class Input:
-    """A stream as its receiver sees it, reliable when its id is: then up to ``window`` messages (a power of two) may
-    come early and are kept, each up to ``mtu`` bytes."""
+    """A stream as its receiver sees it, reliable when its id is: then messages that come early are kept, less than
+    ``window`` of them, each up to ``mtu`` bytes."""
 
     def __init__(self, stream_id: int, mtu: int = 0, window: int = 1) -> None:
         self.stream_id = stream_id
         self.reliable = stream_id >= _STREAM_RELIABLE
+        self.mtu = mtu
         self.window = window
         self.lost = 0  # messages that a best-effort stream has skipped
-        self.buf: "Buffer" = bytearray(mtu * window)
-        self.base = 0
-        self.size = 0
-        self._mtu = mtu
-        self._sizes = sizes(window)
+        self.early: "dict[int, bytes]" = {}  # messages that are kept, by their numbers
         self.reset()
 
     def reset(self) -> None:
         """Expects number 0 again; kept messages are dropped."""
         self.expected = 0  # the number handled next
         self.known = 0  # how many messages from there on were seen or announced
-        self.stored = 0  # bit i: message expected + i is kept
+        self.early.clear()
         self.resume_at = 0  # where handling of the expected message goes on, if it is held
         self.busy = False  # a message of it is being handled
         self.fragments: "Joiner | None" = None  # once a fragment came
@@ -55,31 +53,24 @@ class Input:
             return False
         if ahead >= self.known:
             self.known = ahead + 1
-        if ahead and not self.stored >> ahead & 1:
-            self.store(number, buf, off, n)
+        if ahead:
+            self.keep(number, buf, off, n)
         return ahead == 0
 
-    def store(self, number: int, buf: "Buffer", off: int, n: int) -> None:
+    def keep(self, number: int, buf: "Buffer", off: int, n: int) -> None:
         """Keeps a message that came early, or is held; one longer than the MTU is left to be sent again."""
-        if n <= self._mtu:
-            slot = number & self.window - 1
-            self._sizes[slot] = n
-            copy(self.buf, slot * self._mtu, buf, off, n)  # type: ignore[arg-type]
-            self.stored |= 1 << (number - self.expected & 0xFFFF)
-
-    def ready(self) -> bool:
-        """Whether the expected message is kept: then it is ``buf[base:base + size]``."""
-        slot = self.expected & self.window - 1
-        self.base = slot * self._mtu
-        self.size = self._sizes[slot]
-        return self.stored & 1 > 0
+        if n <= self.mtu and number not in self.early:
+            self.early[number] = bytes(memoryview(buf)[off : off + n])
 
     def advance(self, count: int) -> None:
         """The next ``count`` messages are handled or given up."""
         self.expected = self.expected + count & 0xFFFF
         self.known = max(self.known - count, 0)
-        self.stored >>= count
         self.resume_at = 0
+        if self.early:
+            for number in list(self.early):
+                if number - self.expected & 0x8000:
+                    del self.early[number]
 
     def announce(self, first: int, last: int) -> None:
         """Takes a HEARTBEAT: the peer keeps ``first`` to ``last`` and has given up what came before."""
@@ -94,7 +85,10 @@ class Input:
 
     def missing(self) -> int:
         """The bitmap of an ACKNACK: bit i set when ``expected + i`` is known to exist and not here."""
-        return ~self.stored & (1 << min(self.known, _BITS)) - 1
+        bitmap = (1 << min(self.known, _BITS)) - 1
+        for number in self.early:
+            bitmap &= ~(1 << (number - self.expected & 0xFFFF))
+        return bitmap
 
 
 BestEffortInput = Input

@@ -30,13 +30,6 @@ _HOLD_OFF = const(20)
 _STREAM_RELIABLE = const(0x80)
 
 
-def sizes(slots: int) -> "array[int]":
-    """The sizes of so many kept messages. ValueError when it is not a power of two, which numbers need to wrap."""
-    if slots & slots - 1 or not 0 < slots <= 0x4000:
-        raise ValueError("%d messages: it must be a power of two up to 16384" % slots)
-    return array("H", bytes(2 * slots))
-
-
 class Output:
     """A stream as its sender sees it, reliable when its id is.
 
@@ -45,6 +38,8 @@ class Output:
     """
 
     def __init__(self, stream_id: int, mtu: int, head: bytearray, history: int = 1, period: int = 0) -> None:
+        if history & history - 1 or not 0 < history <= 0x4000:
+            raise ValueError("history is %d: it must be a power of two up to 16384" % history)
         self.stream_id = stream_id
         self.reliable = stream_id >= _STREAM_RELIABLE
         self.mtu = mtu
@@ -54,7 +49,7 @@ class Output:
         self.resends = 0
         self.buf = bytearray(mtu * history)
         self._start = len(head)
-        self._sizes = sizes(history)
+        self._sizes = array("H", bytes(2 * history))
         for at in range(0, len(self.buf), mtu or 1):
             self.buf[at : at + self._start] = head
             self.buf[at + 1] = stream_id

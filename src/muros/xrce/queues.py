@@ -1,13 +1,12 @@
 """The reliable streams of a host with many sessions: messages are bytes, held only while they wait.
 
-Same rules and numbers as in ``outputs`` and ``inputs``; a session that is idle holds nothing. A sender may be given
+Same rules and numbers as in ``outputs``; a session that is idle holds nothing. A sender may be given
 more than its window: the rest waits in order, so that nothing accepted is lost.
 """
 
 from collections import deque
 
-from muros.xrce._types import Buffer, Send
-from muros.xrce.inputs import Input
+from muros.xrce._types import Send
 from muros.xrce.outputs import Output
 from muros.xrce.session import SessionCore, go_on
 
@@ -19,7 +18,7 @@ _LAST_FRAGMENT = 0x02
 def resume(session: SessionCore, stream_id: int, now: int) -> None:
     """Goes on with a stream of ``session`` that was held by ``LATER``."""
     stream = session.inputs.get(stream_id)
-    if stream is not None and stream.stored & 1 and not stream.busy:
+    if stream is not None and stream.expected in stream.early and not stream.busy:
         session.now = now
         go_on(session, stream, b"", 0, 0)
 
@@ -123,36 +122,3 @@ class QueuedReliableOutput(Output):
             message = self._kept[-(self.next - number & 0xFFFF)]
             send(message, 0, len(message))
             number = number + 1 & 0xFFFF
-
-
-class QueuedReliableInput(Input):
-    """Keeps early messages as bytes, of any length."""
-
-    def __init__(self, stream_id: int, window: int) -> None:
-        self._early: dict[int, bytes] = {}
-        super().__init__(stream_id, 0, window)
-
-    def reset(self) -> None:
-        """Expects number 0 again; kept messages are dropped."""
-        super().reset()
-        self._early.clear()
-
-    def store(self, number: int, buf: Buffer, off: int, n: int) -> None:
-        """Keeps a message that came early, or the expected one while it is held."""
-        self._early[number] = bytes(buf[off : off + n])
-        self.stored |= 1 << (number - self.expected & 0xFFFF)
-
-    def ready(self) -> bool:
-        """Whether the expected message is kept: then it is ``buf[base:base + size]``."""
-        if not self.stored & 1:
-            return False
-        self.buf = self._early[self.expected]
-        self.size = len(self.buf)
-        return True
-
-    def advance(self, count: int) -> None:
-        """The next ``count`` messages are handled or given up."""
-        super().advance(count)
-        if self._early:
-            for number in [n for n in self._early if not self.stored >> (n - self.expected & 0xFFFF) & 1]:
-                del self._early[number]

@@ -156,19 +156,20 @@ def go_on(session: SessionCore, stream: "Any", buf: "Buffer", off: int, n: int) 
     if not stream.busy:
         stream.busy = True
         try:
-            while stream.ready() or n:
-                if stream.stored & 1:
-                    buf = stream.buf
-                    off = stream.base
-                    n = stream.size
+            while True:
                 number = stream.expected
+                if number in stream.early:
+                    buf = stream.early[number]
+                    off = 0
+                    n = len(buf)
+                elif n == 0:
+                    break
                 at = submessages(session, buf, off + (stream.resume_at or session._start), off + n, stream)
                 if not stream.busy:
                     break  # a submessage has reset the streams: number 0 comes next
                 if stream.expected == number:  # no HEARTBEAT in the message gave it up
                     if at != _DONE:
-                        if not stream.stored & 1:
-                            stream.store(number, buf, off, n)
+                        stream.keep(number, buf, off, n)
                         stream.resume_at = at - off
                         break
                     stream.advance(1)
