@@ -8,9 +8,9 @@ with values of less than 31 bits nothing here allocates unless it says so.
 from array import array
 from struct import pack_into
 
-from muros.compat import MPY
+from muros.compat import MPY, const
 
-TYPE_CHECKING = 0
+TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any

@@ -141,13 +141,13 @@ def _tests() -> Tree:
 CLIENT_BUDGETS: tuple[Budget, ...] = (
     Budget(
         "import of a program that publishes Int32 over serial",
-        40_500,
+        39_500,
         "B",
         GAUGE,
         partial(imported, PUBLISHER, ("std_msgs/msg/Int32",)),
     ),
     Budget(
-        "import of client and rclc, everything but transports", 48_000, "B", GAUGE, partial(imported, CORE)
+        "import of client and rclc, everything but transports", 47_800, "B", GAUGE, partial(imported, CORE)
     ),
     Budget(
         "bytecode of compat, xrce, client and rclc",
@@ -158,7 +158,7 @@ CLIENT_BUDGETS: tuple[Budget, ...] = (
     ),
     Budget(
         "session, MTU 256, history 4, both directions",
-        3_200,
+        2_200,
         "B",
         GAUGE,
         partial(with_tests, object_heap, SESSION, "Session(agent, 1)"),
@@ -191,7 +191,7 @@ CLIENT_BUDGETS: tuple[Budget, ...] = (
         GAUGE,
         partial(with_tests, object_heap, SESSION, "node.service(Service, 'add_two_ints', None)"),
     ),
-    Budget("live heap, publisher and subscription of 64 B, connected", 41_500, "B", GAUGE, heap_of_a_program),
+    Budget("live heap, publisher and subscription of 64 B, connected", 40_000, "B", GAUGE, heap_of_a_program),
     Budget(
         "smallest heap of the same over UDP, as .mpy, 64 bit",
         84,
@@ -208,14 +208,14 @@ CLIENT_BUDGETS: tuple[Budget, ...] = (
     ),
     Budget(
         "instructions to publish 64 B, best effort",
-        95_000,
+        78_000,
         "",
         ("fuel", "mpy-cross"),
         partial(with_tests, instructions, CONNECTED, "board.loose.publish(message)"),
     ),
     Budget(
         "instructions to publish 64 B, reliable, acknowledged, and to spin",
-        340_000,
+        200_000,
         "",
         ("fuel", "mpy-cross"),
         partial(with_tests, instructions, CONNECTED, "acknowledged()"),
