@@ -218,3 +218,17 @@ def test_best_effort_of_boards_and_hosts_are_alike(bodies: list[bytes], start: i
         assert host.post(submessage(body), lines[1].send, 0) == (at >= 0)
     assert lines[0].sent == lines[1].sent
     assert board.next == host.next
+
+
+def test_an_early_message_that_the_heap_has_no_room_for_is_asked_for_again() -> None:
+    class Full(dict[int, bytes]):
+        def __setitem__(self, number: int, message: bytes) -> None:
+            raise MemoryError
+
+    stream = Input(0x80, 64, 4)
+    stream.early = Full()
+    assert not stream.accept(1, b"early", 0, 5)
+    assert stream.missing() == 0b11
+    stream.early = {}
+    assert not stream.accept(1, b"early", 0, 5)
+    assert stream.missing() == 0b01

@@ -58,9 +58,12 @@ class Input:
         return ahead == 0
 
     def keep(self, number: int, buf: "Buffer", off: int, n: int) -> None:
-        """Keeps a message that came early, or is held; one longer than the MTU is left to be sent again."""
+        """Keeps a message that came early, or is held; what is longer than the MTU or the heap is sent again."""
         if n <= self.mtu and number not in self.early:
-            self.early[number] = bytes(memoryview(buf)[off : off + n])
+            try:
+                self.early[number] = bytes(memoryview(buf)[off : off + n])
+            except MemoryError:
+                pass
 
     def advance(self, count: int) -> None:
         """The next ``count`` messages are handled or given up."""
