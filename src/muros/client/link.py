@@ -131,7 +131,6 @@ class Link(SessionCore):
             self._watch(now)
             self.work(now)
             self.flush(now)
-            self.heartbeats(now)
         if self.raised is not None:
             raised, self.raised = self.raised, None
             raise raised

@@ -12,8 +12,8 @@ from muros.client.link import CONNECTING, Link
 from muros.compat import MPY, const, sleep_ms, ticks_diff, ticks_ms
 from muros.xrce import create
 from muros.xrce.create import head
-from muros.xrce.inputs import BestEffortInput, ReliableInput
-from muros.xrce.outputs import BestEffortOutput, ReliableOutput
+from muros.xrce.inputs import Input
+from muros.xrce.outputs import Output
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -87,9 +87,9 @@ class Session(Link):
                 raise TypeError("Session has no option " + name)
             setattr(self, name, options[name])  # type: ignore[literal-required]
         self.largest = self.largest or mtu * history * (1 if MPY else 64)
-        self.reliable = ReliableOutput(_STREAM_RELIABLE, mtu, self.head, history, self.heartbeat)
+        self.reliable = Output(_STREAM_RELIABLE, mtu, self.head, history, self.heartbeat)
         self.outputs[_STREAM_RELIABLE] = self.reliable
-        self.inputs[_STREAM_RELIABLE] = ReliableInput(_STREAM_RELIABLE, mtu, history)
+        self.inputs[_STREAM_RELIABLE] = Input(_STREAM_RELIABLE, mtu, history)
         self.create: "Any" = create
         if self.creation != "binary":
             from muros.xrce import create_text
@@ -178,19 +178,19 @@ class Session(Link):
 
     # For entities
 
-    def output(self, reliable: int) -> "BestEffortOutput":
+    def output(self, reliable: int) -> "Output":
         """The stream to write to; the one for best effort is made at the first need."""
         if reliable:
             return self.reliable
         if _STREAM_BEST_EFFORT not in self.outputs:
-            self.outputs[_STREAM_BEST_EFFORT] = BestEffortOutput(_STREAM_BEST_EFFORT, self.mtu, self.head)
+            self.outputs[_STREAM_BEST_EFFORT] = Output(_STREAM_BEST_EFFORT, self.mtu, self.head)
         return self.outputs[_STREAM_BEST_EFFORT]  # type: ignore[no-any-return]
 
-    def make_input(self, stream_id: int) -> "BestEffortInput | None":
+    def make_input(self, stream_id: int) -> "Input | None":
         """The stream for best effort is made when something comes on it; there are no others."""
         if stream_id != _STREAM_BEST_EFFORT:
             return None
-        made = self.inputs[stream_id] = BestEffortInput(stream_id)
+        made = self.inputs[stream_id] = Input(stream_id)
         return made
 
     def index(self, kind: int) -> int:

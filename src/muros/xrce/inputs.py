@@ -92,7 +92,3 @@ class Input:
         for number in self.early:
             bitmap &= ~(1 << (number - self.expected & 0xFFFF))
         return bitmap
-
-
-BestEffortInput = Input
-ReliableInput = Input

@@ -154,7 +154,3 @@ class Output:
             slot = number & self.history - 1
             send(self.buf, slot * self.mtu, self._sizes[slot])
             number = number + 1 & 0xFFFF
-
-
-BestEffortOutput = Output
-ReliableOutput = Output
