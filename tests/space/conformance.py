@@ -815,6 +815,21 @@ class SpaceConformance:
         self.settle(space)
         assert asked == [b"2"]
 
+    def test_a_request_that_should_not_wait_fails_at_once(self, space: Space, told: list[Finding]) -> None:
+        requester = space.participant("client").requester(ADD)
+        for _ in range(3):
+            assert requester.send(b"x", wait=False) == 0
+        assert requester.waiting == 0
+        self.settle(space)
+        assert [(f.code, f.who) for f in told] == [("no-server", "/client")]
+        assert space.findings.counts() == {"no-server": 3}
+        asked: list[tuple[bytes, bytes]] = []
+        space.participant("server").replier(ADD, None, lambda identity, data: asked.append((identity, data)))
+        self.settle(space)
+        number = requester.send(b"y", wait=False)
+        self.settle(space)
+        assert asked == [(identity_of(requester.gid, number), b"y")]
+
     def test_waiting_requests_are_bounded_by_the_depth(self, space: Space, told: list[Finding]) -> None:
         requester = space.participant("client").requester(ADD, Qos(depth=2))
         for i in range(5):

@@ -1,13 +1,10 @@
 """What docs/space.md shows works, and its table of findings is whole."""
 
-import asyncio
 import re
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-from muros.space import Durability, Qos, Topic, open_space
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs/space.md").read_text()
@@ -26,30 +23,6 @@ def run(program: str) -> dict[str, Any]:
 def test_programs_work(program: str, shown: str, capsys: pytest.CaptureFixture[str]) -> None:
     run(program)
     assert capsys.readouterr().out == shown
-
-
-def test_the_shown_driver_drives() -> None:
-    (program,) = (p for p in PROGRAMS if "def drive" in p)
-    drive = run(program)["drive"]
-    latched = Qos(durability=Durability.TRANSIENT_LOCAL)
-    topic = Topic("rt/a", "T")
-
-    async def main() -> None:
-        done = asyncio.Event()
-        with open_space() as space:
-            drive(space, asyncio.get_running_loop())
-            node = space.participant("node")
-            node.writer(topic, latched).write(b"x")
-            node.reader(topic, latched, lambda reader: done.set())
-            await done.wait()
-            late = asyncio.Event()
-            writer = node.writer(topic, Qos(deadline=1_000_000))
-            writer.on_deadline = late.set
-            writer.write(b"x")
-            await late.wait()
-            assert writer.deadline_missed
-
-    asyncio.run(main())
 
 
 def test_all_codes_of_findings_are_in_the_table() -> None:

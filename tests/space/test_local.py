@@ -1,5 +1,6 @@
 """The local engine: the contract of all engines, and what is its own."""
 
+import asyncio
 from collections.abc import Callable
 from functools import partial
 
@@ -130,11 +131,14 @@ class TestOpening:
                 open_local("", **{name: bad})  # type: ignore[arg-type]
         assert Limits() == Limits(5000, 100 * MS, 5 * SECOND, 1000)
 
+        with pytest.raises(TypeError, match="callbacks is 'many'"):
+            open_space("local:", callbacks="many")
+
     def test_engines_can_be_added(self) -> None:
-        seen: list[tuple[str, dict[str, int]]] = []
+        seen: list[tuple[str, dict[str, object]]] = []
 
         def factory(
-            rest: str, *, findings: Findings | None, clock: Callable[[], int], **options: int
+            rest: str, *, findings: Findings | None, clock: Callable[[], int], **options: object
         ) -> Space:
             seen.append((rest, options))
             return LocalSpace(findings=findings, clock=clock)
@@ -242,6 +246,59 @@ class TestTime:
                     p.requester(ADD).send(b"x")
             assert len(space._core.timers) < 200
             assert space.tick() is None
+
+
+class TestLoop:
+    """A space attached to an asyncio loop serves itself."""
+
+    def test_what_needs_time_happens(self) -> None:
+        async def main() -> None:
+            with open_space() as space:
+                loop = asyncio.get_running_loop()
+                node = space.participant("node")
+                came, missed, told = asyncio.Event(), asyncio.Event(), asyncio.Event()
+                node.writer(CHATTER, LATCHED).write(b"x")
+                node.reader(CHATTER, LATCHED, lambda reader: came.set())
+                space.attach(loop)
+                space.attach(loop)
+                await came.wait()
+                writer = node.writer(CHATTER, Qos(deadline=MS))
+                writer.on_deadline = missed.set
+                writer.write(b"x")
+                await missed.wait()
+                space.findings.on_finding(lambda finding: told.set())
+                node.requester(ADD).send(b"x", wait=False)
+                await told.wait()
+
+        asyncio.run(main())
+
+    def test_one_loop_at_a_time(self) -> None:
+        with open_space() as space:
+            node = space.participant("node")
+            node.writer(CHATTER, LATCHED).write(b"x")
+            for _ in range(2):
+                loop = asyncio.new_event_loop()
+                came = asyncio.Event()
+                space.attach(loop)
+                node.reader(CHATTER, LATCHED, lambda reader, came=came: came.set())  # type: ignore[misc]
+                loop.run_until_complete(came.wait())
+                other = asyncio.new_event_loop()
+                with pytest.raises(SpaceError, match="another event loop"):
+                    space.attach(other)
+                other.close()
+                loop.close()
+                node.writer(CHATTER, Qos(deadline=MS)).write(b"x")
+        with pytest.raises(ClosedError):
+            space.attach(loop)
+
+    def test_a_closed_space_leaves_the_loop_alone(self) -> None:
+        loop = asyncio.new_event_loop()
+        with open_space() as space:
+            space.attach(loop)
+            space.participant("node").requester(ADD).send(b"x")
+            loop.run_until_complete(asyncio.sleep(0))
+        loop.run_until_complete(asyncio.sleep(0))
+        loop.close()
 
 
 class TestOrder:

@@ -115,8 +115,8 @@ class Agent:
             )
         self._loop = asyncio.get_running_loop()
         self._closed = asyncio.Event()
-        self.space.on_wake(lambda: self._arm(_now()))
         try:
+            self.space.attach(self._loop)
             for link in self.links:
                 link.open(self._adapters[link])
         except BaseException:
@@ -154,7 +154,6 @@ class Agent:
             self._timer = None
         for link in self.links:
             link.close()
-        self.space.on_wake(None)
 
     def locators(self, announced: Collection[Link] | None = None) -> list[Locator]:
         """Where clients that ask for an agent are told to find it: at the ``announced`` links, None for all."""
@@ -194,9 +193,6 @@ class Agent:
         due = self.core.tick(now)
         if due is not None:
             waits.append(due)
-        space_due = self.space.tick()
-        if space_due is not None:
-            waits.append(now + max(0, space_due - self.space.clock()) // _NS_PER_MS + 1)
         seconds = time.time()
         findings_due = self.findings.tick(seconds)
         if findings_due is not None:

@@ -4,17 +4,23 @@ Everything passes in CDR bytes. All calls come from one thread (that of the call
 once and never wait. Callbacks run on that thread too: inside the call that caused them or inside
 `Space.tick`, never one inside another. A callback that raises becomes a finding and harms nobody.
 
-Time is the space's clock in nanoseconds. Whoever owns the space calls `tick` when it asks for it.
+Time is the space's clock in nanoseconds. A space that is attached to an asyncio loop serves itself; without one,
+whoever owns it calls `tick` when it asks for it.
 """
+
+from __future__ import annotations
 
 from collections.abc import Callable
 from types import TracebackType
-from typing import Protocol, Self, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, Self, runtime_checkable
 
 from muros.findings import Findings
 from muros.space._graph import Graph
 from muros.space._qos import Qos
 from muros.space._values import CDR_LE, Reply, Request, Sample, Service, Topic
+
+if TYPE_CHECKING:
+    import asyncio
 
 __all__ = [
     "ClosedError",
@@ -180,11 +186,19 @@ class Requester(Entity, Protocol):
     def waiting(self) -> int:
         """Requests that wait for a server, or for room at one."""
 
-    def send(self, data: bytes, *, source_time: int | None = None, representation: int = CDR_LE) -> int:
+    def send(
+        self,
+        data: bytes,
+        *,
+        source_time: int | None = None,
+        representation: int = CDR_LE,
+        wait: bool = True,
+    ) -> int:
         """Send a request; returns its number, which its reply will carry.
 
         While no server is there, the last requests (as many as the QoS keeps) wait for `request_wait` and then
-        become a finding. ClosedError if closed.
+        become a finding. With `wait` false a request that cannot go at once is not sent: the number is 0, and
+        that is a finding. ClosedError if closed.
         """
 
     def take(self) -> Reply | None:
@@ -343,6 +357,14 @@ class Space(Entity, Protocol):
         `key` (1 byte or more; 12 are used as they are) makes its gid the same in every life. `owner` is whom
         findings name, such as "client 0x1A2B0007"; default: the node's full name. ValueError if a living
         participant of the domain has the key, ClosedError if the space is closed.
+        """
+
+    def attach(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Serve the space on this loop from now on: sockets, timers, callbacks. Nobody needs to call `tick` then.
+
+        To be called from the loop's thread, or before it runs. Attaching again to the same loop does nothing; a
+        closed loop may be replaced. SpaceError if the space is attached to another loop, or the engine cannot
+        work here (a port or network interface that is not to be had). ClosedError if the space is closed.
         """
 
     def tick(self) -> int | None:

@@ -36,7 +36,10 @@ class Role(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ParticipantInfo:
-    """A participant. In ROS terms: one node, unless `name` is empty."""
+    """A participant, or one node of it: several nodes of one participant share its gid and differ in their names.
+
+    In ROS terms: one node, unless `name` is empty.
+    """
 
     gid: bytes
     name: str
@@ -45,6 +48,12 @@ class ParticipantInfo:
     enclave: str
     owner: str
     """Whom it belongs to, as findings name it."""
+    vendor: str = ""
+    """Whose implementation it is, in words; empty for this process or when unknown."""
+    host: str = ""
+    """The machine it runs on, as far as it tells."""
+    pid: str = ""
+    """Its process, as far as it tells."""
 
     @property
     def full_name(self) -> str:
@@ -64,6 +73,8 @@ class Endpoint:
     service: str
     """Name of the service whose requests or replies it carries; empty for a plain topic."""
     participant: ParticipantInfo
+    type_hash: str = ""
+    """Hash of its type's definition, such as "RIHS01_df668c74..."; empty when unknown."""
 
 
 @dataclass(frozen=True, slots=True)

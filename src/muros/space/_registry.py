@@ -12,14 +12,16 @@ __all__ = ["EngineFactory", "open_space", "register_engine"]
 
 
 class EngineFactory(Protocol):
-    """Makes a space. `rest` is what follows the colon of the URL, `options` are the engine's own limits."""
+    """Makes a space. `rest` is what follows the colon of the URL, `options` are the engine's own."""
 
     def __call__(
-        self, rest: str, *, findings: Findings | None, clock: Callable[[], int], **options: int
+        self, rest: str, *, findings: Findings | None, clock: Callable[[], int], **options: object
     ) -> Space: ...
 
 
-_ENGINES: Final[dict[str, str | EngineFactory]] = {"local": "muros.space.local:open_local"}
+_ENGINES: Final[dict[str, str | EngineFactory]] = {
+    "local": "muros.space.local:open_local",
+}
 """Engines by name; as text "module:factory" they are imported when first used."""
 
 
@@ -28,7 +30,7 @@ def open_space(
     *,
     findings: Findings | None = None,
     clock: Callable[[], int] = time.time_ns,
-    **options: int,
+    **options: object,
 ) -> Space:
     """Open the space that `url` names: `local:`, or `local:42` to make 42 the domain of who names none.
 

@@ -7,7 +7,7 @@ Nothing is copied, nothing runs in the background: what needs time (deadlines, w
 lies in one heap of timers that `Space.tick` runs.
 """
 
-from muros.space.local._core import Limits
+from muros.space._core import Limits
 from muros.space.local._space import LocalSpace, open_local
 
 __all__ = ["Limits", "LocalSpace", "open_local"]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from functools import partial
 
+from muros.space import _reports
+from muros.space._core import Core
+from muros.space._endpoint import LocalEndpoint, without
 from muros.space._graph import Incompatible, Matched, Unmatched
 from muros.space._qos import Mismatch, mismatches
-from muros.space.local._core import Core
-from muros.space.local._endpoint import LocalEndpoint, without
 from muros.space.local._reader import LocalReader
 from muros.space.local._writer import LocalWriter
 
@@ -75,7 +76,8 @@ def _meet(writer: LocalWriter, reader: LocalReader) -> None:
     core = writer.core
     reasons = reasons_against(writer, reader)
     if reasons:
-        core.notices.append(partial(_report_mismatch, writer, reader, reasons))
+        told = partial(_reports.mismatched, core, reader.owner, writer.owner, reader.topic.name, reasons)
+        core.notices.append(told)
         if core.watchers:
             core.tell(Incompatible(writer.info(), reader.info(), tuple(str(reason) for reason in reasons)))
         return
@@ -89,15 +91,3 @@ def _tell_unmatched(core: Core, writer: LocalWriter, reader: LocalReader) -> Non
         reader.deadline.stop()
     if core.watchers:
         core.tell(Unmatched(writer.info(), reader.info()))
-
-
-def _report_mismatch(writer: LocalWriter, reader: LocalReader, reasons: tuple[Mismatch, ...]) -> None:
-    topic = reader.topic.name
-    writer.core.report(
-        "type-mismatch" if reasons[0].policy == "type" else "qos-mismatch",
-        who=reader.owner,
-        subject=topic,
-        what=f"{reader.owner} gets no {topic} from {writer.owner}",
-        why="; ".join(str(reason) for reason in reasons),
-        remedy="; ".join(reason.remedy for reason in reasons),
-    )

@@ -7,12 +7,12 @@ from itertools import count
 from typing import Final, TypeAlias
 
 from muros.findings import Severity
+from muros.space._core import Core
 from muros.space._door import ClosedError
+from muros.space._endpoint import Closing, LocalEndpoint
 from muros.space._graph import Appeared, ParticipantInfo, Vanished, full_name
 from muros.space._qos import Durability, Qos
 from muros.space._values import Service, Topic
-from muros.space.local._core import Core
-from muros.space.local._endpoint import Closing, LocalEndpoint
 from muros.space.local._matching import TopicRecord
 from muros.space.local._reader import LocalReader
 from muros.space.local._services import LocalReplier, LocalRequester

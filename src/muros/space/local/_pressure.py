@@ -12,8 +12,8 @@ from collections import deque
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from muros.space._timers import Timer
     from muros.space.local._reader import LocalReader
-    from muros.space.local._timers import Timer
     from muros.space.local._writer import LocalWriter
 
 __all__ = ["Pressure"]

@@ -12,10 +12,10 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Final
 
 from muros.findings import Severity
+from muros.space._endpoint import LocalEndpoint
 from muros.space._graph import Role
 from muros.space._qos import Qos, Reliability
 from muros.space._values import Sample, Topic
-from muros.space.local._endpoint import LocalEndpoint
 from muros.space.local._pressure import Pressure
 
 if TYPE_CHECKING:

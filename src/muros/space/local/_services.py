@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
-from muros.space._qos import Qos, duration
+from muros.space import _reports
+from muros.space._endpoint import Closing
+from muros.space._qos import Qos
+from muros.space._timers import Timer
 from muros.space._values import CDR_LE, Reply, Request, Sample, Service, Topic, split_identity
-from muros.space.local._endpoint import Closing
 from muros.space.local._reader import LocalReader
-from muros.space.local._timers import Timer
 from muros.space.local._writer import LocalWriter
 
 if TYPE_CHECKING:
@@ -78,10 +80,22 @@ class LocalRequester(Closing):
         """Requests that wait for a server or for room."""
         return len(self._waiting or ())
 
-    def send(self, data: bytes, *, source_time: int | None = None, representation: int = CDR_LE) -> int:
-        """Send a request; returns its number."""
-        sample = self.writer.sample(data, source_time, None, representation)
-        if self._waiting or not self.servers or not self.writer.admits():
+    def send(
+        self,
+        data: bytes,
+        *,
+        source_time: int | None = None,
+        representation: int = CDR_LE,
+        wait: bool = True,
+    ) -> int:
+        """Send a request; returns its number, 0 for one that should not wait and cannot go."""
+        writer = self.writer
+        must_wait = not writer.closed and (self._waiting or not self.servers or not writer.admits())
+        if must_wait and not wait:
+            self._refuse()
+            return 0
+        sample = writer.sample(data, source_time, None, representation)
+        if must_wait:
             self._wait(sample)
         else:
             self.writer.deliver(sample)
@@ -121,6 +135,15 @@ class LocalRequester(Closing):
         while self._on_reply is not None and (reply := self.take()) is not None:
             self.writer.core.call(self.writer.owner, self._on_reply, reply.sequence, reply.data)
 
+    def _refuse(self) -> None:
+        writer = self.writer
+        tell = _reports.server_too_slow if self.servers else _reports.no_server
+        code = "server-too-slow" if self.servers else "no-server"
+        writer.core.count(
+            code, writer.owner, self.service.name, partial(tell, writer.core, writer.owner, self.service.name)
+        )
+        writer.core.drain()
+
     def _wait(self, sample: Sample) -> None:
         writer = self.writer
         core = writer.core
@@ -151,39 +174,13 @@ class LocalRequester(Closing):
             waiting.popleft()
             n += 1
         self._schedule()
-        name, waited = self.service.name, duration(writer.core.limits.request_wait)
-        if n and not self.servers:
-            writer.core.report(
-                "no-server",
-                who=writer.owner,
-                subject=name,
-                what=f"{{n}} request{{s}} of {writer.owner} to {name} given up",
-                why=f"no server for {name} within {waited}",
-                remedy=f"Start a server for {name}, or look at its name, type, domain and QoS",
-                n=n,
-            )
-        elif n:
-            writer.core.report(
-                "server-too-slow",
-                who=writer.owner,
-                subject=name,
-                what=f"{{n}} request{{s}} of {writer.owner} to {name} given up",
-                why=f"the server did not take them within {waited}",
-                remedy="Ask less often, or make the server take its requests faster",
-                n=n,
-            )
+        if n:
+            told = _reports.server_too_slow if self.servers else _reports.no_server
+            told(writer.core, writer.owner, self.service.name, n, writer.core.limits.request_wait)
 
     def _tell_overwritten(self, n: int) -> None:
-        writer, name = self.writer, self.service.name
-        writer.core.report(
-            "request-overwritten",
-            who=writer.owner,
-            subject=name,
-            what=f"{{n}} request{{s}} of {writer.owner} to {name} dropped",
-            why=f"no server took them, and only {writer.limit} can wait",
-            remedy=f"Wait for the server before asking, or give the client of {name} a greater depth",
-            n=n,
-        )
+        writer = self.writer
+        _reports.request_overwritten(writer.core, writer.owner, self.service.name, writer.limit, n)
 
 
 class LocalReplier(Closing):
@@ -273,16 +270,7 @@ class LocalReplier(Closing):
             self.writer.core.call(self.writer.owner, self._on_request, request.identity, request.data)
 
     def _tell_unmatched(self, n: int) -> None:
-        writer, name = self.writer, self.service.name
-        writer.core.report(
-            "reply-unmatched",
-            who=writer.owner,
-            subject=name,
-            what=f"{{n}} time{{s}} a reply of {writer.owner} from {name} went to nobody",
-            why="the client that asked is gone, or the reply does not name a request",
-            remedy="Nothing, if the client was stopped; else return the identity that came with the request",
-            n=n,
-        )
+        _reports.reply_unmatched(self.writer.core, self.writer.owner, self.service.name, n)
 
 
 class _ReplyReader(LocalReader):
@@ -337,12 +325,4 @@ class _RequestWriter(LocalWriter):
             self.core.post(self)
 
     def _report_several(self) -> None:
-        service, n = self.service, self._requester.servers
-        self.core.report(
-            "several-servers",
-            who=self.owner,
-            subject=service,
-            what=f"each request of {self.owner} to {service} is answered more than once",
-            why=f"{n} servers offer {service}",
-            remedy=f"Stop all but one of the servers of {service}",
-        )
+        _reports.several_servers(self.core, self.owner, self.service, self._requester.servers)

@@ -6,13 +6,17 @@ import hashlib
 import os
 import time
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from muros.findings import Findings
+from muros.space._core import Core, Limits
 from muros.space._door import ClosedError, SpaceError
-from muros.space.local._core import Core, Limits
-from muros.space.local._endpoint import Closing
+from muros.space._endpoint import Closing
 from muros.space.local._participant import Domain, LocalParticipant, prefixes
 from muros.space.local._view import LocalGraph
+
+if TYPE_CHECKING:
+    import asyncio
 
 __all__ = ["LocalSpace", "open_local"]
 
@@ -67,6 +71,12 @@ class LocalSpace(Closing):
             raise ValueError(f"key {key!r} is in use by {holder.owner}; close it first, or take another key")
         return LocalParticipant(self._core, home, prefix, name, namespace, enclave, owner)
 
+    def attach(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Serve the space on this loop from now on."""
+        if self.closed:
+            raise ClosedError("the space is closed; open another one")
+        self._core.driver.attach(loop)
+
     def tick(self) -> int | None:
         """Do what has become due. Returns when to call again, None = when asked to."""
         return None if self.closed else self._core.tick()
@@ -80,6 +90,7 @@ class LocalSpace(Closing):
         if self.closed:
             return
         self.closed = True
+        self._core.driver.stop()
         for home in tuple(self._domains.values()):
             for participant in tuple(home.participants.values()):
                 participant.close()
@@ -92,7 +103,7 @@ def open_local(
     *,
     findings: Findings | None = None,
     clock: Callable[[], int] = time.time_ns,
-    **limits: int,
+    **limits: object,
 ) -> LocalSpace:
     """The engine of `local:` URLs. `rest` is the default domain; limits are the fields of `Limits`."""
     if rest and not (rest.isascii() and rest.isdigit()):
@@ -101,7 +112,7 @@ def open_local(
     if unknown:
         known = ", ".join(Limits.__dataclass_fields__)
         raise TypeError(f"local: has no option {', '.join(unknown)} (known: {known})")
-    return LocalSpace(domain=int(rest or 0), findings=findings, clock=clock, limits=Limits(**limits))
+    return LocalSpace(domain=int(rest or 0), findings=findings, clock=clock, limits=Limits(**limits))  # type: ignore[arg-type]
 
 
 def _prefix_of(key: bytes) -> bytes:

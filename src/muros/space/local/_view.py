@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
+from muros.space._core import Core
+from muros.space._endpoint import LocalEndpoint
 from muros.space._graph import (
     Endpoint,
     GraphEvent,
@@ -13,8 +15,6 @@ from muros.space._graph import (
     ServiceInfo,
     TopicInfo,
 )
-from muros.space.local._core import Core
-from muros.space.local._endpoint import LocalEndpoint
 from muros.space.local._matching import TopicRecord, reasons_against
 from muros.space.local._participant import Domain
 

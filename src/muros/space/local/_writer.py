@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 from muros.findings import Severity
 from muros.space._door import ClosedError
+from muros.space._endpoint import LocalEndpoint, without
 from muros.space._graph import Role
 from muros.space._qos import Durability, Qos
 from muros.space._values import CDR_LE, GID_SIZE, IDENTITY_SIZE, Sample, Topic
-from muros.space.local._endpoint import LocalEndpoint, without
 
 if TYPE_CHECKING:
     from muros.space.local._participant import LocalParticipant

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeVar
 
+from muros.space._core import Core
 from muros.space._graph import Endpoint, Role
 from muros.space._qos import Qos, duration
+from muros.space._timers import Timer
 from muros.space._values import Topic
-from muros.space.local._core import Core
-from muros.space.local._timers import Timer
 
 if TYPE_CHECKING:
     from muros.space.local._participant import LocalParticipant

@@ -1,4 +1,4 @@
-"""What all parts of one local space share: clock, timers, limits, findings, and the order of callbacks.
+"""What all parts of one space share, whatever its engine: clock, timers, limits, findings, and the order of callbacks.
 
 Callbacks never run one inside another. Whoever has something to tell puts a task into `queue`; the outermost
 `write` (or `tick`) drains it. So two entities that write in each other's callbacks take turns instead of
@@ -14,7 +14,8 @@ from typing import Final, Protocol
 
 from muros.findings import Findings, Severity
 from muros.space._graph import GraphEvent
-from muros.space.local._timers import Timers
+from muros.space._loop import LoopDriver
+from muros.space._timers import Timers
 
 __all__ = ["Core", "Limits", "Task"]
 
@@ -24,7 +25,7 @@ SECOND: Final = 10**9
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Bounds of a local space."""
+    """Bounds of a space."""
 
     resource_limit: int = 5000
     """Samples one reader, one writer's history or one client's waiting requests hold at most."""
@@ -36,6 +37,9 @@ class Limits:
     """Callbacks run in one go before the event loop gets a breath."""
 
     def __post_init__(self) -> None:
+        for name in self.__dataclass_fields__:
+            if not isinstance(getattr(self, name), int):
+                raise TypeError(f"{name} is {getattr(self, name)!r}; it must be a whole number")
         for name in ("resource_limit", "callbacks"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
@@ -64,6 +68,7 @@ class Core:
         self.notices: deque[Callable[[], None]] = deque()
         self.watchers: dict[object, Callable[[GraphEvent], object]] = {}
         self.on_wake: Callable[[], object] | None = None
+        self.driver = LoopDriver(self.tick, clock)
         self._untold: dict[tuple[str, str, str], int] = {}
         self._settling = False
         self._promised: int | None = None
@@ -126,6 +131,7 @@ class Core:
         if self._ticking or (self._promised is not None and self._promised <= when):
             return
         self._promised = when
+        self.driver.wake()
         if self.on_wake is not None:
             self.call("space", self.on_wake)
 
