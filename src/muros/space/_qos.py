@@ -1,13 +1,15 @@
 """Quality of service: what a writer offers, what a reader wants, and whether the two fit.
 
 Rules and default values follow DDS 1.4, 2.2.3 (requested / offered); the presets are the profiles of ROS 2.
-Enumerations carry the numbers DDSI-RTPS uses on the wire, so "more than" can be asked of them.
+The kinds are those of DDSI-RTPS with the numbers it uses on the wire, so "more than" can be asked of them.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final, NamedTuple
+
+from muros.rtps import Durability, History, Liveliness, Ownership, Reliability
 
 __all__ = [
     "PRESETS",
@@ -26,44 +28,6 @@ NONE: Final = 0
 
 MAX_DEPTH: Final = 0x7FFFFFFF
 """Largest history depth DDS can carry (a signed 32-bit number)."""
-
-
-class Reliability(IntEnum):
-    """Whether samples may be lost."""
-
-    BEST_EFFORT = 1
-    RELIABLE = 2
-
-
-class Durability(IntEnum):
-    """What a late reader gets of what was written before."""
-
-    VOLATILE = 0
-    TRANSIENT_LOCAL = 1
-    TRANSIENT = 2
-    PERSISTENT = 3
-
-
-class History(IntEnum):
-    """What is kept when samples come faster than they go."""
-
-    KEEP_LAST = 0
-    KEEP_ALL = 1
-
-
-class Liveliness(IntEnum):
-    """Who says that a writer is alive."""
-
-    AUTOMATIC = 0
-    MANUAL_BY_PARTICIPANT = 1
-    MANUAL_BY_TOPIC = 2
-
-
-class Ownership(IntEnum):
-    """Whether several writers may update the same data."""
-
-    SHARED = 0
-    EXCLUSIVE = 1
 
 
 @dataclass(frozen=True, slots=True)
