@@ -12,15 +12,46 @@ module                            holds
 ``_wire``                         building messages, and all that is needed to handle them
 ``_qos``, ``_discovery_data``     participants and endpoints as discovery carries them
 ``_writer``, ``_reader``          best-effort and reliable endpoints as state machines
+``_domain``, ``_participant``     those of this process that meet others, and what they stand on
+``_news``                         what a participant tells its owner
 ================================  ============================================================================
 """
 
-from muros.rtps._constants import MAX_DOMAIN, BuiltinEndpoint, Ports, vendor_name
+from muros.rtps._constants import MAX_DOMAIN, BuiltinEndpoint, Ports, StatusInfo, vendor_name
 from muros.rtps._discovery_data import EndpointData, InvalidDiscoveryData, ParticipantData, user_values
+from muros.rtps._domain import DomainCore
+from muros.rtps._domain_settings import DOMAIN_DEFAULTS, Addresses, DomainSettings, Transmit
+from muros.rtps._endpoint import Problem
 from muros.rtps._events import InvalidMessage
+from muros.rtps._local import LocalReader, LocalWriter, OnSample, Received
+from muros.rtps._news import (
+    DeadlineMissed,
+    DomainProblem,
+    DomainReport,
+    EndpointChanged,
+    EndpointFound,
+    EndpointLost,
+    Incompatible,
+    LivelinessChanged,
+    LivelinessLost,
+    Matched,
+    Mismatch,
+    ParticipantChanged,
+    ParticipantEvent,
+    ParticipantFound,
+    ParticipantLost,
+    Policy,
+    Trouble,
+    Unmatched,
+    Why,
+)
+from muros.rtps._parameters import InvalidParameters, Parameters, inline_qos, related_identity
+from muros.rtps._participant import ParticipantCore
 from muros.rtps._qos import (
     READER_QOS,
     WRITER_QOS,
+    XCDR1,
+    XCDR2,
     AccessScope,
     DestinationOrder,
     Durability,
@@ -32,31 +63,73 @@ from muros.rtps._qos import (
     Reliability,
     ResourceLimits,
 )
-from muros.rtps._values import INFINITE, Locator, guid_of, split_guid, udp4
+from muros.rtps._settings import ReaderSettings, WriterSettings
+from muros.rtps._values import INFINITE, Guid, GuidPrefix, Locator, guid_of, split_guid, udp4
 
 __all__ = [
+    "DOMAIN_DEFAULTS",
     "INFINITE",
     "MAX_DOMAIN",
     "READER_QOS",
     "WRITER_QOS",
+    "XCDR1",
+    "XCDR2",
     "AccessScope",
+    "Addresses",
     "BuiltinEndpoint",
+    "DeadlineMissed",
     "DestinationOrder",
+    "DomainCore",
+    "DomainProblem",
+    "DomainReport",
+    "DomainSettings",
     "Durability",
     "DurabilityService",
+    "EndpointChanged",
     "EndpointData",
+    "EndpointFound",
+    "EndpointLost",
     "EndpointQos",
+    "Guid",
+    "GuidPrefix",
     "History",
+    "Incompatible",
     "InvalidDiscoveryData",
     "InvalidMessage",
+    "InvalidParameters",
     "Liveliness",
+    "LivelinessChanged",
+    "LivelinessLost",
+    "LocalReader",
+    "LocalWriter",
     "Locator",
+    "Matched",
+    "Mismatch",
+    "OnSample",
     "Ownership",
+    "Parameters",
+    "ParticipantChanged",
+    "ParticipantCore",
     "ParticipantData",
+    "ParticipantEvent",
+    "ParticipantFound",
+    "ParticipantLost",
+    "Policy",
     "Ports",
+    "Problem",
+    "ReaderSettings",
+    "Received",
     "Reliability",
     "ResourceLimits",
+    "StatusInfo",
+    "Transmit",
+    "Trouble",
+    "Unmatched",
+    "Why",
+    "WriterSettings",
     "guid_of",
+    "inline_qos",
+    "related_identity",
     "split_guid",
     "udp4",
     "user_values",
