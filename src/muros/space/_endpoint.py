@@ -1,21 +1,18 @@
-"""What writers and readers have in common, and the watch over their deadlines."""
+"""What writers and readers of all engines have in common, and the watch over their deadlines."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from types import TracebackType
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import Protocol, Self, TypeVar
 
 from muros.space._core import Core
-from muros.space._graph import Endpoint, Role
+from muros.space._graph import Endpoint, ParticipantInfo, Role
 from muros.space._qos import Qos, duration
 from muros.space._timers import Timer
 from muros.space._values import Topic
 
-if TYPE_CHECKING:
-    from muros.space.local._participant import LocalParticipant
-
-__all__ = ["Closing", "DeadlineWatch", "LocalEndpoint", "without"]
+__all__ = ["Closing", "DeadlineWatch", "EngineEndpoint", "Home", "without"]
 
 _T = TypeVar("_T")
 
@@ -38,24 +35,33 @@ class Closing:
         self.close()
 
 
-class LocalEndpoint(Closing):
+class Home(Protocol):
+    """The participant of an endpoint, as far as the endpoint needs it."""
+
+    core: Core
+    owner: str
+
+    def info(self) -> ParticipantInfo:
+        """Itself as a value."""
+
+
+class EngineEndpoint(Closing):
     """A writer or reader. Slots only: a fleet has thousands of them, most of them idle."""
 
     __slots__ = (
-        "closed", "core", "deadline", "gid", "on_deadline", "participant", "qos", "service", "topic",
+        "closed", "core", "deadline", "gid", "on_deadline", "participant", "qos", "service", "topic", "type_hash",
     )  # fmt: skip
 
     role: Role
 
-    def __init__(
-        self, participant: LocalParticipant, topic: Topic, qos: Qos, gid: bytes, service: str = ""
-    ) -> None:
+    def __init__(self, participant: Home, topic: Topic, qos: Qos, gid: bytes, service: str = "") -> None:
         self.core: Core = participant.core
         self.participant = participant
         self.topic = topic
         self.qos = qos
         self.gid = gid
         self.service = service
+        self.type_hash = ""
         self.closed = False
         self.on_deadline: Callable[[], object] | None = None
         self.deadline = DeadlineWatch(self) if qos.deadline else None
@@ -81,12 +87,6 @@ class LocalEndpoint(Closing):
         """Whether it is the request side of a service."""
         return False
 
-    def close(self) -> None:
-        """Take it out of the space."""
-        if not self.closed:
-            self.participant.remove(self)
-            self.core.settle()
-
     def detach(self) -> None:
         """It has been taken out of the space: let go of everything held."""
         self.closed = True
@@ -103,6 +103,7 @@ class LocalEndpoint(Closing):
             qos=self.qos,
             service=self.service,
             participant=self.participant.info(),
+            type_hash=self.type_hash,
         )
 
     def __repr__(self) -> str:
@@ -118,7 +119,7 @@ class DeadlineWatch:
 
     __slots__ = ("_base", "_endpoint", "_queued", "_timer", "missed")
 
-    def __init__(self, endpoint: LocalEndpoint) -> None:
+    def __init__(self, endpoint: EngineEndpoint) -> None:
         self._endpoint = endpoint
         self._base = 0
         self._timer: Timer | None = None

@@ -6,7 +6,7 @@ from functools import partial
 
 from muros.space import _reports
 from muros.space._core import Core
-from muros.space._endpoint import LocalEndpoint, without
+from muros.space._endpoint import EngineEndpoint, without
 from muros.space._graph import Incompatible, Matched, Unmatched
 from muros.space._qos import Mismatch, mismatches
 from muros.space.local._reader import LocalReader
@@ -25,7 +25,7 @@ class TopicRecord:
         self.writers: tuple[LocalWriter, ...] = ()
         self.readers: tuple[LocalReader, ...] = ()
 
-    def join(self, endpoint: LocalEndpoint) -> None:
+    def join(self, endpoint: EngineEndpoint) -> None:
         """`endpoint` comes: it meets everybody on the other side."""
         if isinstance(endpoint, LocalWriter):
             self.writers += (endpoint,)
@@ -36,7 +36,7 @@ class TopicRecord:
             for writer in self.writers:
                 _meet(writer, endpoint)
 
-    def leave(self, endpoint: LocalEndpoint) -> None:
+    def leave(self, endpoint: EngineEndpoint) -> None:
         """`endpoint` goes: those it was matched with lose it."""
         core = endpoint.core
         if isinstance(endpoint, LocalWriter):

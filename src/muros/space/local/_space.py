@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import time
 from collections.abc import Callable
@@ -12,7 +11,8 @@ from muros.findings import Findings
 from muros.space._core import Core, Limits
 from muros.space._door import ClosedError, SpaceError
 from muros.space._endpoint import Closing
-from muros.space.local._participant import Domain, LocalParticipant, prefixes
+from muros.space._participant import prefix_of, prefixes
+from muros.space.local._participant import Domain, LocalParticipant
 from muros.space.local._view import LocalGraph
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class LocalSpace(Closing):
             for empty in [n for n, d in self._domains.items() if not d.participants]:
                 del self._domains[empty]
             home = self._domains[number] = Domain(number)
-        prefix = self._next_prefix() if key is None else _prefix_of(key)
+        prefix = self._next_prefix() if key is None else prefix_of(key)
         if (holder := home.participants.get(prefix)) is not None:
             raise ValueError(f"key {key!r} is in use by {holder.owner}; close it first, or take another key")
         return LocalParticipant(self._core, home, prefix, name, namespace, enclave, owner)
@@ -113,10 +113,3 @@ def open_local(
         known = ", ".join(Limits.__dataclass_fields__)
         raise TypeError(f"local: has no option {', '.join(unknown)} (known: {known})")
     return LocalSpace(domain=int(rest or 0), findings=findings, clock=clock, limits=Limits(**limits))  # type: ignore[arg-type]
-
-
-def _prefix_of(key: bytes) -> bytes:
-    """The 12 bytes of a gid prefix for a participant's key."""
-    if not key:
-        raise ValueError("the key of a participant is empty; leave it out, or give at least one byte")
-    return bytes(key) if len(key) == 12 else hashlib.blake2b(key, digest_size=12).digest()

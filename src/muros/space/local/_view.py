@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 
 from muros.space._core import Core
-from muros.space._endpoint import LocalEndpoint
+from muros.space._endpoint import EngineEndpoint
 from muros.space._graph import (
     Endpoint,
     GraphEvent,
@@ -94,7 +94,7 @@ class LocalGraph:
 
         return cancel
 
-    def _endpoints(self) -> Iterator[LocalEndpoint]:
+    def _endpoints(self) -> Iterator[EngineEndpoint]:
         for domain in self._domains.values():
             yield from domain.endpoints.values()
 
@@ -120,7 +120,7 @@ def _topic_info(record: TopicRecord, domain: int) -> TopicInfo:
     )
 
 
-def _services(endpoints: Iterable[LocalEndpoint], domain: Domain) -> Iterator[ServiceInfo]:
+def _services(endpoints: Iterable[EngineEndpoint], domain: Domain) -> Iterator[ServiceInfo]:
     """Services by name. The request side tells: its readers are the servers, its writers the clients."""
     servers: dict[str, list[Endpoint]] = {}
     clients: dict[str, list[Endpoint]] = {}

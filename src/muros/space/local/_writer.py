@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from muros.findings import Severity
 from muros.space._door import ClosedError
-from muros.space._endpoint import LocalEndpoint, without
+from muros.space._endpoint import EngineEndpoint, without
 from muros.space._graph import Role
 from muros.space._qos import Durability, Qos
 from muros.space._values import CDR_LE, GID_SIZE, IDENTITY_SIZE, Sample, Topic
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["LocalWriter"]
 
 
-class LocalWriter(LocalEndpoint):
+class LocalWriter(EngineEndpoint):
     """Writes samples of one topic. See `muros.space.Writer`."""
 
     __slots__ = (
@@ -34,6 +34,7 @@ class LocalWriter(LocalEndpoint):
     )  # fmt: skip
 
     role = Role.WRITER
+    participant: LocalParticipant
 
     def __init__(
         self, participant: LocalParticipant, topic: Topic, qos: Qos, gid: bytes, service: str = ""
@@ -180,6 +181,10 @@ class LocalWriter(LocalEndpoint):
     def all_readers(self) -> tuple[LocalReader, ...]:
         """The readers of all its samples, and the clients that get their own."""
         return self.readers if self.clients is None else (*self.readers, *self.clients.values())
+
+    def close(self) -> None:
+        """Take it out of the space."""
+        self.participant.close_child(self)
 
     def detach(self) -> None:
         """Let go of everything held."""
