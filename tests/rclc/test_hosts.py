@@ -143,9 +143,11 @@ def test_what_was_refused_leaves_nothing_behind(make: str) -> None:
     assert len(board.session.entities) == 1, "the participant"
 
 
-def test_urls_are_for_middlewares_that_are_registered() -> None:
-    with pytest.raises(ValueError, match=r"Go through an agent: Context\(Udp\('127.0.0.1', 8888\)\)"):
-        Context("local:")
+def test_urls_are_for_spaces_and_middlewares_that_are_registered() -> None:
+    with pytest.raises(
+        ValueError, match=r"known: local:.*Through an agent: Context\(Udp\('127.0.0.1', 8888\)\)"
+    ):
+        Context("nothing:")
 
 
 def test_a_service_whose_callback_returns_nonsense_is_named() -> None:

@@ -370,7 +370,7 @@ def test_spin_period_keeps_its_pace() -> None:  # X21
 
 
 def test_urls_need_a_middleware() -> None:
-    with pytest.raises(ValueError, match="'nothing:': no middleware for nothing: is registered"):
+    with pytest.raises(ValueError, match="'nothing:' names no data space engine"):
         Context("nothing:")
     world = World()
     made: list[tuple[str, int]] = []

@@ -7,17 +7,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from muros.client import reasons
 from muros.client.hosts import Session
+from muros.client.names import topic_name
 from muros.rclc import context as context_
 from muros.rclc import executor as executor_
 from muros.rclc import node as node_
 from muros.rclc import service as service_
 from muros.rclc import subscription as subscription_
 from muros.rclc.errors import InvalidNameError, RclError
-from muros.rclc.middleware import open_url
+from muros.rclc.middleware import _engines, open_url
 
 if TYPE_CHECKING:
     from muros.client.qos import Qos
@@ -34,6 +36,7 @@ _INVALID_ARGUMENT = 11
 _TOPIC_NAME_INVALID = 103
 _SERVICE_NAME_INVALID = 104
 _LARGEST_DOMAIN = 232
+_LONGEST_NAME = 59  # characters of a topic in DDS: agents take no more
 
 
 class WrongTypeError(TypeError):
@@ -49,25 +52,45 @@ class WrongValueError(ValueError):
 
 
 class Context(context_.Context):
-    """A way into the ROS graph: a transport to an agent, a session of your own making, or a URL.
+    """A way into the ROS graph: a transport to an agent, a session of your own making, a URL, or a data space.
 
-    ``Context(Udp("192.168.1.10"))``, ``Context(Session(Udp("192.168.1.10"), queue=8))``. ``client_key`` is for a
-    session that is made here; a random one if it is None. URLs are for middlewares that were registered with
-    ``muros.rclc.register``; this version brings none. Raises TypeError and ValueError.
+    ``Context(Udp("192.168.1.10"))``, ``Context(Session(Udp("192.168.1.10"), queue=8))`` go through an agent;
+    ``client_key`` is for a session that is made here, a random one if it is None. ``Context("dds:")`` is straight in
+    the ROS 2 graph, ``Context("local:")`` in a space of this process, ``Context(space)`` or ``Context(space=...)`` in
+    a space of your own making; further schemes may be registered with ``muros.rclc.register``. ``domain_id`` None is
+    0 through an agent, else the domain of the URL or the space.
+
+    Raises TypeError and ValueError, RclError for a space that cannot be had.
     """
 
-    def __init__(self, way: Any, client_key: int | bytes | None = None, domain_id: int = 0) -> None:
-        if not isinstance(domain_id, int) or not 0 <= domain_id <= _LARGEST_DOMAIN:
+    def __init__(
+        self,
+        way: Any = None,
+        client_key: int | bytes | None = None,
+        domain_id: int | None = None,
+        *,
+        space: Any = None,
+    ) -> None:
+        if domain_id is not None and not (isinstance(domain_id, int) and 0 <= domain_id <= _LARGEST_DOMAIN):
             raise WrongValueError(f"domain_id is {domain_id!r}: it must be from 0 to {_LARGEST_DOMAIN}")
-        if isinstance(way, str):
-            way = open_url(way, domain_id)
-        elif isinstance(way, type) or not (hasattr(way, "participant") or hasattr(way, "receive")):
+        if space is not None:
+            if way is not None:
+                raise WrongTypeError("Context takes a transport or a space, not both")
+            way = space
+        if isinstance(way, type) or not (
+            isinstance(way, str) or hasattr(way, "participant") or hasattr(way, "receive")
+        ):
             raise WrongTypeError(f"Context needs a transport such as Udp('192.168.1.10', 8888), not {way!r}")
-        elif not hasattr(way, "participant"):
+        if hasattr(way, "receive") and not hasattr(way, "participant"):
             way = Session(way, client_key)
         elif client_key is not None:
             raise WrongTypeError("client_key belongs to the session: Context(Session(transport, client_key))")
-        super().__init__(way, None, domain_id)
+        if isinstance(way, str) and way.split(":")[0] in _engines:
+            way = open_url(way, domain_id or 0)
+        elif isinstance(way, str) or hasattr(way, "graph"):
+            way = import_module("muros.space.rclc").open_way(way, domain_id)
+            domain_id = way.domain
+        super().__init__(way, None, domain_id or 0)
         self.services: dict[str, Service] = {}
 
     def node(self, name: str, namespace: str = "") -> Node:
@@ -151,8 +174,9 @@ class Node(node_.Node):
         return handle
 
     def _topic(self, name: str) -> str:
+        longest = getattr(self.context.middleware, "longest_name", _LONGEST_NAME)
         try:
-            return super()._topic(name)
+            return topic_name("rt", self._resolve(name), "", longest)
         except ValueError as error:
             raise _invalid(error, _TOPIC_NAME_INVALID) from None
 

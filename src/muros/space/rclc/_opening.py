@@ -1,0 +1,109 @@
+"""Which space a context stands on: one of its own making, or the one that a URL names."""
+
+from __future__ import annotations
+
+import asyncio
+import atexit
+import os
+from contextlib import suppress
+from importlib import import_module
+from typing import Final
+
+from muros.rclc.errors import RclError
+from muros.space._door import ClosedError, Space, SpaceError, UnknownEngineError
+from muros.space._registry import open_space
+from muros.space.rclc._ground import Ground
+from muros.space.rclc._middleware import SpaceMiddleware
+from muros.space.rclc._serving import server
+
+__all__ = ["open_way"]
+
+_grounds: Final[dict[object, Ground]] = {}
+"""By URL, or by the identity of a space that was given."""
+
+
+def open_way(way: str | Space, domain: int | None = None) -> SpaceMiddleware:
+    """What carries a context whose way is a URL (`dds:`, `dds:42`, `local:`) or a space.
+
+    All contexts of a process that name the same engine stand on one space, whatever their domains. `domain` None
+    means that of the URL, else that of the space. ValueError for a URL that names nothing, or two domains at once;
+    RclError for a space that is closed, that is served by another asyncio loop, or that cannot be had here.
+    """
+    wrong = import_module("muros.rclc.hosts").WrongValueError
+    key: object
+    if isinstance(way, str):
+        scheme, colon, rest = way.partition(":")
+        numbered = rest.isascii() and rest.isdigit()
+        if numbered:
+            if domain is not None and domain != int(rest):
+                raise wrong(f"{way!r} with domain_id={domain}: name the domain once")
+            domain = int(rest)
+        url = f"{scheme}:" if colon and numbered else way
+        key = url
+    else:
+        url, key = "", id(way)
+    serving = server()
+    with serving.lock:
+        ground = _grounds.get(key)
+        if ground is None:
+            if isinstance(way, str):
+                try:
+                    space = open_space(url)
+                except UnknownEngineError as error:
+                    raise wrong(f"{error}. Through an agent: Context(Udp('127.0.0.1', 8888))") from None
+                except SpaceError as error:
+                    raise wrong(str(error)) from None
+            else:
+                space = way
+            ground = _grounds[key] = _prepare(space, key, owned=isinstance(way, str))
+        return SpaceMiddleware(ground, ground.space.domain if domain is None else domain)
+
+
+def _prepare(space: Space, key: object, *, owned: bool) -> Ground:
+    """A ground for a space, served by us or by the loop that runs in this thread."""
+    serving = server()
+
+    def forget() -> None:
+        _grounds.pop(key, None)
+
+    serving.use()
+    try:
+        try:
+            space.attach(serving.loop)
+            return Ground(space, serving, forget, owned=owned, served=True)
+        except ClosedError as error:
+            raise RclError(str(error)) from None
+        except SpaceError as error:
+            running = asyncio._get_running_loop()
+            if owned or running is None:
+                raise RclError(_served_elsewhere(error, owned)) from None
+            try:
+                space.attach(running)
+            except SpaceError:
+                raise RclError(_served_elsewhere(error, owned)) from None
+            return Ground(space, serving, forget, owned=False, served=False)
+    except RclError:
+        if owned:
+            space.close()
+        raise
+    finally:
+        serving.release()
+
+
+def _served_elsewhere(error: SpaceError, owned: bool) -> str:
+    if owned:
+        return str(error)
+    return f"{error}. Make the context in the thread of that loop, or give it a space of its own"
+
+
+def _goodbye() -> None:
+    """Close what is open still, so that nothing of us stays in the graph."""
+    for ground in list(_grounds.values()):
+        for context in list(ground.contexts):
+            with suppress(Exception):  # the program is over: there is nobody left to tell
+                context.close()
+
+
+atexit.register(_goodbye)
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_grounds.clear)
