@@ -92,3 +92,38 @@ def test_a_failing_command_and_a_dead_peer_are_told(jazzy: Peer, domain: Domain)
     jazzy.kill()
     with pytest.raises(PeerError, match="ended"):
         jazzy.do("node", name="late", domain=domain)
+
+
+@pytest.mark.parametrize("other", ["cyclone", "fastdds"])
+def test_other_vendors_exchange_messages_with_ros(other: str, jazzy: Peer, domain: Domain) -> None:
+    with start(other) as vendor:
+        node = jazzy.do("node", name="ros", domain=domain)
+        theirs = vendor.do("node", name="vendor", domain=domain)
+        text = {"topic": "/chatter", "type": "std_msgs/msg/String"}
+        publisher = vendor.do("publisher", node=theirs, **text)
+        subscription = jazzy.do("subscription", node=node, **text)
+        assert jazzy.do("matched", thing=subscription) == vendor.do("matched", thing=publisher) == 1
+        vendor.do("publish", publisher=publisher, message={"data": "n"}, count=2, number="data")
+        assert jazzy.do("take", subscription=subscription, count=2) == [{"data": "n0"}, {"data": "n1"}]
+
+        array = {"topic": "/bytes", "type": "std_msgs/msg/UInt8MultiArray"}
+        publisher = jazzy.do("publisher", node=node, **array)
+        subscription = vendor.do("subscription", node=theirs, **array)
+        assert jazzy.do("matched", thing=publisher) == vendor.do("matched", thing=subscription) == 1
+        jazzy.do("publish_bytes", publisher=publisher, size=300_000)
+        got = vendor.do("take", subscription=subscription)
+        assert got == [{"data": {"size": 300_000, "sum": 824308248}}]
+
+
+def test_services_among_processes_of_cyclone(domain: Domain) -> None:
+    with start("cyclone") as server, start("cyclone") as client:
+        name = {"name": "/sum", "type": "test_msgs/srv/BasicTypes"}
+        rule = "{'int64_value': request.int64_value + request.int32_value}"
+        service = server.do(
+            "service", node=server.do("node", name="server", domain=domain), rule=rule, **name
+        )
+        caller = client.do("client", node=client.do("node", name="client", domain=domain), **name)
+        server.begin("serve", service=service, count=3)
+        answers = client.do("call", client=caller, request={"int32_value": 5}, number="int64_value", count=3)
+        assert [answer["int64_value"] for answer in answers] == [5, 6, 7]
+        assert server.result() == 3
