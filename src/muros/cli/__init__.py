@@ -16,6 +16,9 @@ COMMANDS = {
     "agent": ("muros.cli.agent", "connect DDS-XRCE clients, such as boards that speak micro-ROS"),
     "board": ("muros.cli.board", "write the files that a MicroPython board needs"),
     "interface": ("muros.cli.interface", "show, list and generate message, service and action types"),
+    "topic": ("muros.cli.topic", "list, show, publish and measure topics of the ROS 2 graph"),
+    "node": ("muros.cli.node", "list and show nodes of the ROS 2 graph"),
+    "service": ("muros.cli.service", "list and call services of the ROS 2 graph"),
 }
 """Sub-commands: the module, which has `run(argv) -> int` or `register(subparsers)` for argparse, and its help."""
 
