@@ -89,7 +89,6 @@ class Network:
         self._overflown: dict[socket.socket, int] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._due = 0
-        self._at_once = False
 
     @classmethod
     def shared(
@@ -138,6 +137,7 @@ class Network:
         _open.add(self)
         if self._pair is not None:
             self._watch = Watch(loop, self._refresh)
+            self._use(self._meant())
             self._refresh()
             self._peers.open(loop)
         self.poke()
@@ -183,7 +183,7 @@ class Network:
         self._sender.close()
         for sock in self._sockets():
             sock.close()
-        self._pair = self._multicast = None
+        self._pair = self._multicast = self._loop = None
 
     @property
     def _who(self) -> str:
@@ -226,30 +226,39 @@ class Network:
 
     def _refresh(self) -> None:
         """Goes by the interfaces and peers as they are now."""
-        if self._loop is None or self._pair is None or self._multicast is None:
+        if self._loop is None:  # closed while a name was looked up
             return
         meant = self._meant()
-        if meant != self._interfaces or not self._joined:
-            self._interfaces = meant
-            group = [
-                i for i in meant if i.multicast and (i.loopback or self.settings.range is not Range.LOCALHOST)
-            ]
-            present = {interface.index for interface in group}
-            for index in self._joined - present:
-                leave(self._multicast, self.settings.group, index)
-            self._joined &= present
-            for interface in group:
-                if interface.index not in self._joined and join(
-                    self._multicast, self.settings.group, interface
-                ):
-                    self._joined.add(interface.index)
-            self._sender.set_interfaces(self._loop, group)
-            if not meant:
-                self._tell(_NO_INTERFACE, "", 1)
+        if meant != self._interfaces:
+            self._use(meant)
         addresses = self._addresses()
         if addresses != self.core.addresses:
             self.core.set_addresses(addresses, self.clock())
             self.poke()
+
+    def _use(self, meant: tuple[Interface, ...]) -> None:
+        loop, multicast = self._loop, self._multicast
+        assert loop is not None
+        assert multicast is not None
+        self._interfaces = meant
+        inward = self.settings.range is Range.LOCALHOST
+        group = [
+            interface for interface in meant if interface.multicast and (interface.loopback or not inward)
+        ]
+        present = {interface.index for interface in group}
+        for index in self._joined - present:
+            leave(multicast, self.settings.group, index)
+        self._joined &= present
+        for interface in group:
+            if interface.index in self._joined:
+                continue
+            if join(multicast, self.settings.group, interface):
+                self._joined.add(interface.index)
+            else:
+                self._tell(_NO_MULTICAST, interface.name, 1)
+        self._sender.set_interfaces(loop, group)
+        if not meant:
+            self._tell(_NO_INTERFACE, "", 1)
 
     def _addresses(self) -> Addresses:
         """Where peers reach this process, and where it looks for them.
