@@ -18,6 +18,9 @@ from muros.space.rclc._serving import server
 
 __all__ = ["open_way"]
 
+LARGEST_DOMAIN: Final = 232
+"""The ports of a larger one do not exist (DDSI-RTPS 2.3, 9.6.1.1)."""
+
 _grounds: Final[dict[object, Ground]] = {}
 """By URL, or by the identity of a space that was given."""
 
@@ -38,6 +41,8 @@ def open_way(way: str | Space, domain: int | None = None) -> SpaceMiddleware:
             if domain is not None and domain != int(rest):
                 raise wrong(f"{way!r} with domain_id={domain}: name the domain once")
             domain = int(rest)
+            if domain > LARGEST_DOMAIN:
+                raise wrong(f"{way!r}: a domain is from 0 to {LARGEST_DOMAIN}")
         url = f"{scheme}:" if colon and numbered else way
         key = url
     else:
