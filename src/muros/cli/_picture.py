@@ -178,19 +178,26 @@ def to_dot(view: View) -> str:
     """In the language of Graphviz."""
     lines = ["digraph muros {", "  rankdir=LR;", '  node [fontname="sans-serif", fontsize=11];']
     names = {thing: f"{thing.kind.value} {thing.name}" for thing in view.things}
+    broken = _broken(view)
     for thing, types in view.things.items():
         attributes = f"label={_quoted(thing.name)}, shape={_SHAPES[thing.kind]}"
         lines.append(f"  {_quoted(names[thing])} [{attributes}, tooltip={_quoted(types or thing.name)}];")
     for link in view.links:
         a, b = link.ends
-        lines.append(f"  {_quoted(names[a])} -> {_quoted(names[b])} [tooltip={_quoted(link.qos)}];")
-    for topic, writer, reader, why in view.misfits:
-        ends = f"{_quoted(names[writer])} -> {_quoted(names[reader])}"
-        lines.append(
-            f"  {ends} [style=dashed, color=red, constraint=false, label={_quoted(topic.name)}, "
-            f"tooltip={_quoted(why)}];"
-        )
+        why = broken.get((a, b))
+        look = f"tooltip={_quoted(why or link.qos)}" + (", style=dashed, color=red" if why else "")
+        lines.append(f"  {_quoted(names[a])} -> {_quoted(names[b])} [{look}];")
     return "\n".join([*lines, "}", ""])
+
+
+def _broken(view: View) -> dict[tuple[Thing, Thing], str]:
+    """The lines from topics to readers that some writer does not reach, with the reasons."""
+    broken: dict[tuple[Thing, Thing], str] = {}
+    for topic, writer, reader, why in view.misfits:
+        told = f"{writer.name} does not reach {reader.name}: {why}"
+        before = broken.get((topic, reader))
+        broken[topic, reader] = f"{before}\n{told}" if before else told
+    return broken
 
 
 def _quoted(text: str) -> str:
@@ -230,14 +237,15 @@ def to_svg(view: View) -> str:
         'orient="auto-start-reverse"><path d="M0,0.5 L7,4 L0,7.5" style="stroke-width:1.4"/></marker></defs>',
         f'<g transform="translate({MARGIN:.0f} {MARGIN:.0f})">',
     ]
+    broken = _broken(view)
     words: dict[tuple[Thing, Thing], list[str]] = {}
     for link in view.links:
         words.setdefault(link.ends, []).append(link.qos)
     for ends, qos in words.items():
         if ends in layout.routes:
-            lines.append(_path(_curve(ends, layout, sizes), "", _described(ends, qos)))
-    for topic, writer, reader, why in view.misfits:
-        lines.append(_path(_bow(layout, writer, reader), "misfit", f"{topic.name}: {why}"))
+            why = broken.get(ends)
+            curve = _curve(ends, layout, sizes)
+            lines.append(_path(curve, "misfit" if why else "", why or _described(ends, qos)))
     for thing, (x, y) in layout.centres.items():
         assert isinstance(thing, Thing)
         lines.append(_shape(thing, x, y, sizes[thing][0], view.things[thing]))
@@ -264,13 +272,6 @@ def _curve(ends: tuple[Thing, Thing], layout: Layout, sizes: dict[Thing, tuple[f
         middle = (ax + bx) / 2
         parts.append(f"C{middle:.1f},{ay:.1f} {middle:.1f},{by:.1f} {bx:.1f},{by:.1f}")
     return " ".join(parts)
-
-
-def _bow(layout: Layout, a: Thing, b: Thing) -> str:
-    """A bow over the picture between two nodes that do not meet."""
-    (ax, ay), (bx, by) = layout.centres[a], layout.centres[b]
-    top = min(ay, by) - HEIGHT
-    return f"M{ax:.1f},{ay - HEIGHT / 2:.1f} Q{(ax + bx) / 2:.1f},{top:.1f} {bx:.1f},{by - HEIGHT / 2:.1f}"
 
 
 def _shape(thing: Thing, x: float, y: float, width: float, types: str) -> str:
