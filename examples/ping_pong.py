@@ -2,6 +2,9 @@
 
     python ping_pong.py alice udp 127.0.0.1 8888
     micropython ping_pong.py bob serial /dev/ttyUSB0 115200
+    python ping_pong.py carol dds:
+
+The first two go through an agent, the third is straight in the ROS 2 graph; where the agent is in the graph, they meet.
 
 Every node sends a ping with a random sequence and its device id, and answers the pings of the others with a pong that
 carries the same words. Whoever hears a pong to its own last ping counts it.
@@ -51,12 +54,14 @@ class PingPong:
             print(f"Pong for seq {message.frame_id} ({self.pongs})")
 
     def on_state(self, state: str) -> None:
-        """Tells how the link to the agent does; there is nothing else to do about it."""
+        """Tells how the way into the graph does; there is nothing else to do about it."""
         print("state", state)
 
 
-def transport(words: "list[str]") -> object:
-    """The transport that the command line names; imported here, so that a board loads only what it uses."""
+def way(words: "list[str]") -> object:
+    """The way that the command line names; imported here, so that a board loads only what it uses."""
+    if len(words) == 1:
+        return words[0]  # the URL of a data space
     kind, place, number = words
     if kind == "udp":
         from muros.client import Udp
@@ -73,11 +78,13 @@ def transport(words: "list[str]") -> object:
 
 def main(arguments: "list[str]") -> int:
     """Plays until it is stopped."""
-    if len(arguments) < 4:
+    words = 1 if len(arguments) > 1 and ":" in arguments[1] else 3
+    if len(arguments) < 1 + words:
         print("usage: ping_pong.py NAME udp|tcp|serial HOST|DEVICE PORT|BAUD [PERIOD_S]")
+        print("       ping_pong.py NAME dds:[DOMAIN] [PERIOD_S]")
         return 2
-    context = Context(transport(arguments[1:4]))
-    PingPong(context, arguments[0], float(arguments[4]) if len(arguments) > 4 else 2.0)
+    context = Context(way(arguments[1 : 1 + words]))
+    PingPong(context, arguments[0], float(arguments[1 + words]) if len(arguments) > 1 + words else 2.0)
     Executor(context).spin()
     return 0
 
