@@ -51,8 +51,8 @@ def opaque(type_name: str) -> Any:
 class Node:
     """A DDS participant with the name of a node."""
 
-    def __init__(self, name: str, domain: int, namespace: str) -> None:
-        self.name, self.namespace = name, namespace
+    def __init__(self, name: str, domain: int, namespace: str, gid_size: int) -> None:
+        self.name, self.namespace, self.gid_size = name, namespace, gid_size
         self.participant = DomainParticipant(domain, Qos(Policy.Userdata(b"enclave=/;")))
         self.readers: list[Any] = []
         self.writers: list[Any] = []
@@ -65,16 +65,19 @@ class Node:
             self.tell()
 
     def tell(self) -> None:
-        """Say on ros_discovery_info what the node has (gids of 16 bytes, as since Iron)."""
+        """Say on ros_discovery_info what the node has (gids have 16 bytes since Iron, 24 before)."""
         if self.graph is None:
             return
-        data = bytearray(self.participant.guid.bytes) + struct.pack("<I", 1)
+        data = bytearray(self.gid(self.participant)) + struct.pack("<I", 1)
         for text in (self.namespace, self.name):
             data += bytes(-len(data) % 4) + struct.pack("<I", len(text) + 1) + text.encode() + b"\0"
         for entities in (self.readers, self.writers):
             data += bytes(-len(data) % 4) + struct.pack("<I", len(entities))
-            data += b"".join(entity.guid.bytes for entity in entities)
+            data += b"".join(map(self.gid, entities))
         self.graph.write(opaque("rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_")(LE + bytes(data)))
+
+    def gid(self, entity: Any) -> bytes:
+        return bytes(entity.guid.bytes).ljust(self.gid_size, b"\0")
 
     def writer(self, topic: str, type_name: str, qos: Any) -> Any:
         made = DataWriter(self.participant, Topic(self.participant, topic, opaque(type_name)), qos)
@@ -148,8 +151,30 @@ class Cyclone:
         self.things: dict[int, Any] = {}
         self.numbers = itertools.count(1)
 
-    def node(self, name: str, domain: int, namespace: str = "/") -> int:
-        return self._keep(Node(name, domain, namespace))
+    def node(self, name: str, domain: int, namespace: str = "/", gid_size: int = 16) -> int:
+        return self._keep(Node(name, domain, namespace, gid_size))
+
+    def told(self, node: int, count: int = 1, wait: float = 10.0) -> list[str]:
+        """What others say on ros_discovery_info, hexadecimal: waits for `count`."""
+        thing = self.things[node]
+        qos = policies({"reliability": "reliable", "durability": "transient_local", "depth": 100})
+        topic = Topic(
+            thing.participant,
+            "ros_discovery_info",
+            opaque("rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"),
+        )
+        reader = DataReader(thing.participant, topic, qos)
+        own = thing.participant.guid.bytes
+        got: list[str] = []
+
+        def enough() -> bool:
+            for sample in reader.take(100):
+                if hasattr(sample, "raw") and sample.raw[4:20] != own:
+                    got.append(sample.raw.hex())
+            return len(got) >= count
+
+        wait_for(enough, wait)
+        return got
 
     def reset(self) -> None:
         self.things.clear()
