@@ -9,6 +9,7 @@ lists: most are short, and there may be thousands.
 from collections.abc import Iterator
 
 from muros.rtps._endpoint import NEVER
+from muros.rtps._values import EntityId, GuidPrefix
 
 __all__ = ["History", "Sample"]
 
@@ -16,7 +17,7 @@ __all__ = ["History", "Sample"]
 class Sample:
     """One written sample. `payload` begins with the four bytes of its encapsulation and must not change."""
 
-    __slots__ = ("expires", "inline_qos", "instance", "key", "last", "payload", "sequence", "stamp")
+    __slots__ = ("expires", "inline_qos", "instance", "key", "last", "payload", "sequence", "stamp", "to")
 
     def __init__(
         self,
@@ -42,6 +43,8 @@ class Sample:
         """Nothing follows in this instance: it is forgotten once everybody knows."""
         self.expires = expires
         """When the sample's lifespan ends, on the clock of `now`."""
+        self.to: tuple[GuidPrefix, EntityId] | None = None
+        """The only reader it is for; None = all."""
 
 
 class History:

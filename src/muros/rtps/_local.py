@@ -1,13 +1,29 @@
-"""Writers and readers of a participant, as its owner sees them."""
+"""Writers and readers of users: what a participant's owner holds in the hand.
+
+They are ports (`_ports.py`): the state machines of `_writer.py` and `_reader.py`, with what DDS puts around them:
+matching, deadline, liveliness, ownership, instances.
+"""
 
 from collections.abc import Callable
-from typing import NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
-from muros.rtps._constants import StatusInfo
+from muros.rtps._constants import StatusInfo, keyed
 from muros.rtps._discovery_data import EndpointData
-from muros.rtps._parameters import Parameters
-from muros.rtps._qos import EndpointQos
-from muros.rtps._values import EntityId, Guid
+from muros.rtps._events import Data
+from muros.rtps._liveliness import OwnLease
+from muros.rtps._news import DeadlineMissed, LivelinessLost, Mismatch
+from muros.rtps._parameters import InvalidParameters, Parameters, key_hash, status_info
+from muros.rtps._parameters import inline_qos as build_inline_qos
+from muros.rtps._ports import ReaderPort, WriterPort
+from muros.rtps._qos import EndpointQos, History, Liveliness, Ownership
+from muros.rtps._reader import ReaderCore
+from muros.rtps._settings import ReaderSettings, WriterSettings
+from muros.rtps._values import INFINITE, Guid
+from muros.rtps._watch import Deadlines, Owners
+from muros.rtps._writer import SENTINEL_SIZE, WriterCore
+
+if TYPE_CHECKING:
+    from muros.rtps._participant import ParticipantCore
 
 __all__ = ["LocalReader", "LocalWriter", "OnSample", "Received"]
 
@@ -22,8 +38,9 @@ class Received(NamedTuple):
     source_time: int | None
     """When it was written, ns since 1970; None = not said."""
     inline_qos: Parameters | None
-    status: StatusInfo | int = 0
-    """Whether the instance was disposed or unregistered; always 0 on topics without a key."""
+    status: int = 0
+    """Whether the instance was disposed or unregistered (`StatusInfo`); always 0 on topics without a key. The payload
+    then is empty or only the key."""
     instance: bytes = b""
     """Key hash of the instance, 16 bytes, where the writer sends it; empty = not said, or no key."""
     expires: int | None = None
@@ -33,37 +50,101 @@ class Received(NamedTuple):
 OnSample: TypeAlias = Callable[[Received], bool | None]
 """Takes a sample. False refuses it for now: it, and what is behind it, waits until `LocalReader.resume`.
 
-Called while the datagram is handled: may write with any writer and close anything, but must not raise.
+Called while a datagram is handled: may write with any writer and close anything, but must not raise.
 """
 
 
-class LocalWriter:
+class LocalWriter(WriterPort):
     """A writer of ours. Made by `ParticipantCore.writer`."""
 
-    guid: Guid
-    entity: EntityId
-    data: EndpointData
-    """What others are told of it."""
+    __slots__ = (
+        "_deadlines",
+        "_domain",
+        "_lease",
+        "_owner",
+        "_watched",
+        "closed",
+        "data",
+        "guid",
+        "refused",
+        "remotes",
+    )
+
+    def __init__(
+        self,
+        owner: "ParticipantCore",
+        data: EndpointData,
+        *,
+        now: int,
+        last: int,
+        settings: WriterSettings,
+        endpoint_qos: bytes,
+        on_room: Callable[[], object] | None,
+    ) -> None:
+        qos = data.qos
+        domain = owner.owner
+        super().__init__(
+            WriterCore(
+                data.guid,
+                owner.send,
+                reliable=qos.reliable,
+                transient_local=qos.durability > 0,
+                depth=None if qos.history == History.KEEP_ALL else max(1, qos.depth),
+                lifespan=0 if qos.lifespan >= INFINITE else max(1, qos.lifespan),
+                endpoint_qos=endpoint_qos,
+                last=last,
+                settings=settings,
+                report=owner.reporter(data.guid),
+                on_room=None if on_room is None else lambda: domain.later(on_room),
+            )
+        )
+        self.guid: Final = data.guid
+        self.data: EndpointData = data
+        """What others are told of it."""
+        self.closed = False
+        self.remotes: dict[Guid, EndpointData] = {}
+        """Matched readers."""
+        self.refused: dict[Guid, tuple[Mismatch, ...]] = {}
+        """Readers of its topic that do not match, and why."""
+        self._owner = owner
+        self._domain = domain
+        self._deadlines: Deadlines | None = None
+        self._lease: OwnLease | None = None
+        if qos.deadline < INFINITE:
+            self._deadlines = Deadlines(
+                qos.deadline,
+                domain.settings.instances,
+                domain.agenda,
+                lambda total, instance: owner.tell(DeadlineMissed(self.guid, total, instance)),
+            )
+        if qos.liveliness != Liveliness.AUTOMATIC and qos.lease < INFINITE:
+            self._lease = OwnLease(
+                max(qos.lease, domain.settings.lease_least),
+                domain.agenda,
+                lambda total: owner.tell(LivelinessLost(self.guid, total)),
+                now,
+            )
+        self._watched = self._deadlines is not None or qos.liveliness != Liveliness.AUTOMATIC
 
     @property
     def qos(self) -> EndpointQos:
         """As given when it was made."""
-        raise NotImplementedError
+        return self.data.qos
 
     @property
     def matched(self) -> tuple[Guid, ...]:
         """Readers it writes to."""
-        raise NotImplementedError
+        return tuple(self.remotes)
 
     @property
     def last(self) -> int:
         """Sequence number of the last sample written."""
-        raise NotImplementedError
+        return self.core.last
 
     @property
     def acknowledged(self) -> bool:
-        """Whether all reliable readers have everything written so far."""
-        raise NotImplementedError
+        """Whether all reliable readers (but those set aside as stalled) have everything written so far."""
+        return self.core.acknowledged >= self.core.last
 
     def write(
         self,
@@ -80,10 +161,24 @@ class LocalWriter:
 
         source_time: ns since 1970. inline_qos: a little-endian parameter list (`muros.rtps.inline_qos`).
         to: only this matched reader gets it (the others learn that it is not for them). instance: key hash of 16
-        bytes, for a topic with a key. ValueError: `to` is not matched, the inline QoS are too large, or the writer
-        is closed.
+        bytes, for a topic with a key. ValueError: `to` is not matched, the inline QoS are too large, the time does
+        not fit RTPS, or the writer is closed.
         """
-        raise NotImplementedError
+        if self.closed:
+            raise ValueError("the writer is closed")
+        domain = self._domain
+        domain.now = now
+        if instance:
+            inline_qos = inline_qos[:-SENTINEL_SIZE] + build_inline_qos(key_hash=instance)
+        core = self.core
+        sequence = core.write(payload, now, source_time, inline_qos, instance=instance, to=to)
+        if core.due < self.wake_at:
+            domain.agenda.at(self, core.due)
+        if self._watched and sequence is not None:
+            self._written(instance, now)
+        if (domain.inside or domain.news) and not domain.busy:
+            domain.settle()
+        return sequence or 0
 
     def dispose(
         self,
@@ -94,48 +189,243 @@ class LocalWriter:
         source_time: int | None = None,
         unregister: bool = False,
     ) -> int:
-        """The instance is no more. key: its serialized key, where known. unregister: nor will it be written again."""
-        raise NotImplementedError
+        """The instance with this key hash is no more; returns as `write`.
+
+        key: its serialized key, encapsulation included, where known. unregister: nor will it be written again.
+        ValueError for a topic without a key, and as `write`.
+        """
+        status = StatusInfo.DISPOSED | StatusInfo.UNREGISTERED if unregister else StatusInfo.DISPOSED
+        return self._end(instance, status, key, source_time, now)
 
     def unregister(
         self, instance: bytes, now: int, *, key: bytes = b"", source_time: int | None = None
     ) -> int:
-        """The instance will not be written by this writer any more."""
-        raise NotImplementedError
+        """The instance will not be written by this writer any more; returns and raises as `dispose`."""
+        return self._end(instance, StatusInfo.UNREGISTERED, key, source_time, now)
 
     def assert_liveliness(self, now: int) -> None:
         """The writer is alive (manual liveliness). Writing says so, too."""
-        raise NotImplementedError
+        if self.closed:
+            return
+        self._domain.now = now
+        if self.qos.liveliness == Liveliness.MANUAL_BY_TOPIC:
+            self.core.assert_liveliness(now)
+        self._assert(now)
+        self._domain.finish()
 
     def close(self, now: int) -> None:
-        """Take it away; others are told. Closing twice is allowed."""
-        raise NotImplementedError
+        """Take it away; others are told. What they have not acknowledged is lost. Closing twice is allowed."""
+        if not self.closed:
+            self._owner.close_endpoint(self, now)
+            self._domain.finish()
+
+    def stop(self) -> None:
+        """It is closed: nothing of it is woken any more. For its participant."""
+        self.closed = True
+        agenda = self._domain.agenda
+        for timed in (self, self._deadlines, self._lease):
+            if timed is not None:
+                agenda.forget(timed)
+
+    def asserted(self, now: int) -> None:
+        """Its participant is alive, says its user. For its participant."""
+        if self._lease is not None:
+            self._lease.touch(now)
+
+    def _end(self, instance: bytes, status: StatusInfo, key: bytes, source_time: int | None, now: int) -> int:
+        if self.closed:
+            raise ValueError("the writer is closed")
+        if not keyed(self.entity):
+            raise ValueError("the topic has no key, and so no instance that could end")
+        if len(instance) != 16:
+            raise ValueError(f"a key hash has 16 bytes, this one has {len(instance)}")
+        self._domain.now = now
+        sequence = self.core.write(
+            key,
+            now,
+            source_time,
+            build_inline_qos(key_hash=instance, status=status),
+            key=True,
+            instance=instance,
+            last=bool(status & StatusInfo.UNREGISTERED),
+        )
+        if sequence is not None and self._deadlines is not None:
+            self._deadlines.end(instance)
+        self._domain.agenda.at(self, self.core.due)
+        self._domain.finish()
+        return sequence or 0
+
+    def _written(self, instance: bytes, now: int) -> None:
+        if self._deadlines is not None:
+            self._deadlines.touch(instance, now)
+        if self.qos.liveliness != Liveliness.AUTOMATIC:
+            self._assert(now)
+
+    def _assert(self, now: int) -> None:
+        if self.qos.liveliness == Liveliness.MANUAL_BY_PARTICIPANT:
+            self._owner.assert_manual(now)
+        else:
+            self.asserted(now)
 
 
-class LocalReader:
+class LocalReader(ReaderPort):
     """A reader of ours. Made by `ParticipantCore.reader`."""
 
-    guid: Guid
-    entity: EntityId
-    data: EndpointData
+    __slots__ = (
+        "_deadlines", "_domain", "_keyed", "_lifespans", "_on_sample", "_owner", "_plain", "closed", "data",
+        "guid", "outranked", "owners", "refused", "remotes",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        owner: "ParticipantCore",
+        data: EndpointData,
+        on_sample: OnSample,
+        *,
+        settings: ReaderSettings,
+    ) -> None:
+        qos = data.qos
+        domain = owner.owner
+        super().__init__(
+            ReaderCore(
+                data.guid,
+                owner.send,
+                self._deliver,
+                reliable=qos.reliable,
+                settings=settings,
+                report=owner.reporter(data.guid),
+            )
+        )
+        self.guid: Final = data.guid
+        self.data: EndpointData = data
+        """What others are told of it."""
+        self.closed = False
+        self.remotes: dict[Guid, EndpointData] = {}
+        """Matched writers."""
+        self.refused: dict[Guid, tuple[Mismatch, ...]] = {}
+        """Writers of its topic that do not match, and why."""
+        self.outranked = 0
+        """Samples left out because a stronger writer owns their instance."""
+        self.owners = Owners(domain.settings.instances) if qos.ownership == Ownership.EXCLUSIVE else None
+        self._owner = owner
+        self._domain = domain
+        self._on_sample = on_sample
+        self._keyed = keyed(self.entity)
+        self._lifespans: dict[Guid, int] = {}
+        self._deadlines: Deadlines | None = None
+        if qos.deadline < INFINITE:
+            self._deadlines = Deadlines(qos.deadline, domain.settings.instances, domain.agenda, self._missed)
+        self._plain = not self._keyed and self.owners is None and self._deadlines is None
 
     @property
     def qos(self) -> EndpointQos:
         """As given when it was made."""
-        raise NotImplementedError
+        return self.data.qos
 
     @property
     def matched(self) -> tuple[Guid, ...]:
         """Writers it reads from."""
-        raise NotImplementedError
+        return tuple(self.remotes)
 
     def resume(self, now: int) -> None:
         """Offer again what was refused."""
-        raise NotImplementedError
+        if not self.closed:
+            domain = self._domain
+            domain.now = now
+            busy, domain.busy = domain.busy, True
+            try:
+                self.core.resume(now)
+            finally:
+                domain.busy = busy
+            domain.agenda.at(self, self.core.due)
+            domain.finish()
 
     def close(self, now: int) -> None:
         """Take it away; others are told. Closing twice is allowed."""
-        raise NotImplementedError
+        if not self.closed:
+            self._owner.close_endpoint(self, now)
+            self._domain.finish()
+
+    def stop(self) -> None:
+        """It is closed: nothing of it is woken any more. For its participant."""
+        self.closed = True
+        self._domain.agenda.forget(self)
+        if self._deadlines is not None:
+            self._deadlines.stop()
+            self._domain.agenda.forget(self._deadlines)
+
+    def add(self, writer: EndpointData) -> None:
+        """A writer is matched, or has changed. For its participant."""
+        self.remotes[writer.guid] = writer
+        if writer.qos.lifespan < INFINITE:
+            self._lifespans[writer.guid] = writer.qos.lifespan
+        else:
+            self._lifespans.pop(writer.guid, None)
+        if self.owners is not None:
+            self.owners.add(writer.guid, writer.qos.strength)
+
+    def drop(self, writer: Guid) -> None:
+        """A writer is matched no more. For its participant."""
+        del self.remotes[writer]
+        self._lifespans.pop(writer, None)
+        if self.owners is not None:
+            self.owners.drop(writer)
+        if not self.remotes and self._deadlines is not None:
+            self._deadlines.stop()
+
+    def _deliver(self, writer: Guid, event: Data) -> bool:
+        """What the core hands over."""
+        if self.closed:
+            return True
+        inline = event.inline_qos
+        if self._plain and (inline is None or not status_info_of(inline)):
+            status, instance = 0, b""
+        else:
+            status, instance = status_info_of(inline), b"" if not self._keyed else key_hash_of(inline)
+            if not self._admit(writer, status, instance):
+                return True
+        if (event.key or not event.payload) and not status:
+            return True  # says nothing
+        lifespan = self._lifespans.get(writer) if self._lifespans else None
+        expires = None if lifespan is None else self._domain.now + lifespan
+        received = Received(
+            writer, event.sequence, event.payload, event.time, inline, status, instance, expires
+        )
+        return self._on_sample(received) is not False
+
+    def _admit(self, writer: Guid, status: int, instance: bytes) -> bool:
+        """Whether the sample is to be handed on."""
+        if status and not self._keyed:
+            return False  # there is nothing that could end
+        if self.owners is not None and not self.owners.admits(writer, instance):
+            self.outranked += 1
+            return False
+        if status & StatusInfo.UNREGISTERED and self.owners is not None:
+            self.owners.free(instance)
+        if self._deadlines is not None:
+            if status:
+                self._deadlines.end(instance)
+            else:
+                self._deadlines.touch(instance, self._domain.now)
+        return True
+
+    def _missed(self, total: int, instance: bytes) -> None:
+        if self.owners is not None:
+            self.owners.free(instance)
+        self._owner.tell(DeadlineMissed(self.guid, total, instance))
 
 
-OnRoom: TypeAlias = Callable[[], object]
+def status_info_of(inline_qos: Parameters | None) -> int:
+    """`status_info`, nothing where it is malformed."""
+    try:
+        return int(status_info(inline_qos))
+    except InvalidParameters:
+        return 0
+
+
+def key_hash_of(inline_qos: Parameters | None) -> bytes:
+    """`key_hash`, nothing where there is none or it is malformed."""
+    try:
+        return key_hash(inline_qos) or b""
+    except InvalidParameters:
+        return b""

@@ -60,7 +60,7 @@ class ReaderCore:
     """
 
     __slots__ = (
-        "_at", "_deliver", "_entity", "_proxies", "_report", "_send", "_timed", "guid", "reliable", "settings",
+        "_deliver", "_entity", "_proxies", "_report", "_send", "_timed", "due", "guid", "reliable", "settings",
     )  # fmt: skip
 
     def __init__(
@@ -82,12 +82,13 @@ class ReaderCore:
         self._report = report
         self._proxies: dict[tuple[GuidPrefix, EntityId], WriterProxy] = {}
         self._timed: dict[WriterProxy, None] = {}  # those that wait for a time
-        self._at = NEVER
+        self.due = NEVER
+        """When `tick` is needed next, `NEVER` = not before something else happens."""
 
     @property
     def deadline(self) -> int | None:
         """When `tick` is needed next; None = not before something else happens."""
-        return None if self._at == NEVER else self._at
+        return None if self.due == NEVER else self.due
 
     @property
     def writers(self) -> tuple[WriterProxy, ...]:
@@ -253,7 +254,7 @@ class ReaderCore:
 
     def tick(self, now: int) -> int | None:
         """Do what is due at `now`; returns the new `deadline`."""
-        self._at = NEVER
+        self.due = NEVER
         for proxy in tuple(self._timed):
             if proxy.hello_at <= now:
                 self._hello(proxy, now)
@@ -264,7 +265,7 @@ class ReaderCore:
                 stale = self._drop_stale(proxy, now)
             at = min(proxy.hello_at, proxy.answer_at, stale)
             if at < NEVER:
-                self._at = min(self._at, at)
+                self.due = min(self.due, at)
             else:
                 self._timed.pop(proxy, None)
         return self.deadline
@@ -459,7 +460,7 @@ class ReaderCore:
 
     def _wake(self, proxy: WriterProxy, at: int) -> None:
         self._timed[proxy] = None
-        self._at = min(self._at, at)
+        self.due = min(self.due, at)
 
     def _tell(self, problem: Problem, proxy: WriterProxy, number: int) -> None:
         if self._report is not None:

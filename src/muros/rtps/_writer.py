@@ -35,6 +35,7 @@ from muros.rtps._wire import (
     data_frag,
     gap,
     heartbeat,
+    info_dst,
     info_ts,
 )
 
@@ -56,6 +57,13 @@ ASK_MOST: Final = 64
 """... and one that keeps many this often."""
 
 
+SKIPS_MOST: Final = 24
+"""GAPs to several readers at one place that share a datagram."""
+
+EVERYBODY: Final = bytes(12)
+"""As destination: whoever listens."""
+
+
 class WriterCore:
     """One writer. Calls with `now` (ns, monotonic) may change `deadline`; look at it afterwards.
 
@@ -73,10 +81,10 @@ class WriterCore:
     """
 
     __slots__ = (
-        "_allowance", "_ask_at", "_ask_every", "_at", "_count", "_cursor", "_endpoint_qos", "_entity",
+        "_allowance", "_ask_at", "_ask_every", "_count", "_cursor", "_endpoint_qos", "_entity",
         "_history", "_idle", "_lagging", "_leaving", "_lifespan", "_on_room", "_proxies", "_refused",
         "_reliable", "_repairing", "_report", "_retains", "_routes", "_send", "_unasked", "_unsent",
-        "_with_qos", "guid", "last", "reliable", "sent", "settings",
+        "_with_qos", "due", "guid", "last", "reliable", "sent", "settings",
     )  # fmt: skip
 
     def __init__(
@@ -126,12 +134,13 @@ class WriterCore:
         self._ask_every = max(1, min(ASK_MOST, kept // 4))
         self._unasked = 0
         self._refused = False
-        self._at = NEVER
+        self.due = NEVER
+        """When `tick` is needed next, `NEVER` = not before something else happens."""
 
     @property
     def deadline(self) -> int | None:
         """When `tick` is needed next; None = not before something else happens."""
-        return None if self._at == NEVER else self._at
+        return None if self.due == NEVER else self.due
 
     @property
     def readers(self) -> tuple[ReaderProxy, ...]:
@@ -208,14 +217,16 @@ class WriterCore:
         key: bool = False,
         instance: bytes = b"",
         last: bool = False,
+        to: Guid | None = None,
     ) -> int | None:
         """Write a sample; returns its sequence number, or None when a writer that keeps all has no room now.
 
         payload: begins with its encapsulation. source_time: ns since 1970. inline_qos: a little-endian parameter
         list. instance: names the instance of a topic with a key. key: the payload is only the key. last: the
-        instance ends here, and is forgotten when all readers know.
+        instance ends here, and is forgotten when all readers know. to: only this matched reader gets the sample, the
+        others get a GAP.
 
-        ValueError when the inline QoS are too large or the time does not fit RTPS.
+        ValueError when the inline QoS are too large, the time does not fit RTPS, or `to` is not matched.
         """
         settings = self.settings
         stamp = info_ts(source_time)
@@ -227,14 +238,18 @@ class WriterCore:
             raise ValueError(f"inline QoS of {len(qos)} bytes do not fit beside a fragment")
         sequence = self.last + 1
         sample = Sample(sequence, payload, stamp, qos, key, instance, last)
+        if to is not None:
+            sample.to = split_guid(to)
+            if sample.to not in self._proxies:
+                raise ValueError(f"reader {to.hex()} is not matched")
         if self._reliable or self._retains or self._unsent or (self._routes and not whole):
             if self._lifespan:
                 sample.expires = now + self._lifespan
-                self._at = min(self._at, sample.expires)
+                self.due = min(self.due, sample.expires)
                 self._expire(now)
             if self._is_full() and not self._make_room(now):
                 self._refused = True
-                self._at = min(self._at, self._patience_ends())
+                self.due = min(self.due, self._patience_ends())
                 return None
             self._history.add(sample)
         self.last = sequence
@@ -283,7 +298,7 @@ class WriterCore:
         ):
             return
         sample = self._history.get(number)
-        if sample is not None:
+        if sample is not None and sample.to in (None, (proxy.prefix, proxy.entity)):
             total = fragments_of(len(sample.payload), self.settings.fragment_size)
             fragments = [fragment for fragment in event.missing if 1 <= fragment <= total]
             if not fragments:
@@ -314,18 +329,21 @@ class WriterCore:
             self._beat(due, now)
         if self._refused and self._make_room(now):
             self._tell_room()
-        self._at = min((proxy.due for proxy in self._lagging), default=NEVER)
-        self._at = min(self._at, expires)
+        self.due = min((proxy.due for proxy in self._lagging), default=NEVER)
+        self.due = min(self.due, expires)
         if self._unsent or self._repairing:
-            self._at = min(self._at, now + self.settings.pace)
+            self.due = min(self.due, now + self.settings.pace)
         if self._refused:
-            self._at = min(self._at, self._patience_ends())
+            self.due = min(self.due, self._patience_ends())
         return self.deadline
 
     # --- Sending -----------------------------------------------------------------------------------------
 
     def _transmit(self, sample: Sample, now: int) -> None:
         """Send a sample that fits a datagram to everybody."""
+        if sample.to is not None:
+            self._transmit_to(sample, now)
+            return
         self.sent = sample.sequence
         content = data(
             ENTITYID_UNKNOWN,
@@ -337,13 +355,37 @@ class WriterCore:
         )
         submessages = [sample.stamp, content]
         if self._reliable:
-            self._expect(now)
-            self._unasked += 1
-            if now >= self._ask_at or self._unasked >= self._ask_every:
-                submessages.append(self._ask(now))
+            submessages += self._expect_and_ask(now)
         send = self._send
         for place in self._routes:
             send(submessages, None, place)
+
+    def _transmit_to(self, sample: Sample, now: int) -> None:
+        """Send a sample that fits a datagram to the one it is for, and tell the others not to wait for it."""
+        self.sent = sample.sequence
+        beat = self._expect_and_ask(now)
+        proxy = self._proxies.get(sample.to) if sample.to else None
+        if proxy is not None:
+            content = data(
+                proxy.entity, self._entity, sample.sequence, sample.payload,
+                inline_qos=sample.inline_qos, key=sample.key,
+            )  # fmt: skip
+            for place in proxy.places:
+                self._send([sample.stamp, content, *beat], proxy.prefix, place)
+        self._skip(sample, beat)
+
+    def _skip(self, sample: Sample, beat: list[bytes]) -> None:
+        """Tell all but the one a sample is for that it is not for them."""
+        told: dict[Place, list[bytes]] = {}
+        for key, proxy in self._proxies.items():
+            if proxy.reliable and key != sample.to:
+                skip = gap(proxy.entity, self._entity, sample.sequence, sample.sequence + 1)
+                for place in proxy.places:
+                    told.setdefault(place, []).append(info_dst(proxy.prefix) + skip)
+        everybody = [info_dst(EVERYBODY), *beat] if beat else []
+        for place, skips in told.items():
+            for start in range(0, len(skips), SKIPS_MOST):
+                self._send(skips[start : start + SKIPS_MOST] + everybody, None, place)
 
     def _pump(self, now: int) -> None:
         """Send what waits, as far as the allowance goes."""
@@ -361,25 +403,38 @@ class WriterCore:
                 self._transmit(sample, now)
             else:
                 self._leaving = sample
-                total = fragments_of(len(sample.payload), size)
-                while self._cursor < total:
-                    if not self._may_send(now):
-                        return
-                    self._cursor += 1
-                    submessages = [sample.stamp, self._fragment(ENTITYID_UNKNOWN, sample, self._cursor)]
-                    if self._cursor == total:
-                        self.sent = sample.sequence
-                        if self._reliable:
-                            self._expect(now)
-                            submessages.append(self._ask(now))
-                    self._allowance.spend(size * len(self._routes))
-                    for place in self._routes:
-                        self._send(submessages, None, place)
+                if not self._pump_fragments(sample, now):
+                    return
             self._leaving = None
             self._cursor = 0
             del unsent[0]
         if not self._lagging:
             self._release(now)
+
+    def _pump_fragments(self, sample: Sample, now: int) -> bool:
+        """Send what has not been sent of a large sample; False when the allowance is used up before its end."""
+        reader, prefix, places = ENTITYID_UNKNOWN, None, self._routes
+        if sample.to is not None:
+            proxy = self._proxies.get(sample.to)
+            reader, prefix = sample.to[1], sample.to[0]
+            places = proxy.places if proxy is not None else ()
+        total = fragments_of(len(sample.payload), self.settings.fragment_size)
+        while self._cursor < total:
+            if not self._may_send(now):
+                return False
+            self._cursor += 1
+            submessages = [sample.stamp, self._fragment(reader, sample, self._cursor)]
+            if self._cursor == total:
+                self.sent = sample.sequence
+                if self._reliable:
+                    self._expect(now)
+                    submessages.append(self._ask(now))
+            self._allowance.spend(self.settings.fragment_size * len(places))
+            for place in places:
+                self._send(submessages, prefix, place)
+        if sample.to is not None:
+            self._skip(sample, [])
+        return True
 
     def _repair(self, now: int) -> None:
         """Send again what readers want, to them alone, as far as the allowance goes."""
@@ -390,7 +445,7 @@ class WriterCore:
                 number = next(iter(proxy.wanted))
                 fragments = proxy.wanted.pop(number)
                 sample = self._history.get(number)
-                if sample is None:
+                if sample is None or sample.to not in (None, (proxy.prefix, proxy.entity)):
                     gone.append(number)
                     continue
                 if len(sample.payload) + len(sample.inline_qos) <= packet.size:
@@ -409,7 +464,7 @@ class WriterCore:
                 packet.add(self._heartbeat(proxy, final=False))
             packet.flush()
         if self._repairing:
-            self._at = min(self._at, now + self.settings.pace)
+            self.due = min(self.due, now + self.settings.pace)
 
     def _repair_fragments(
         self, packet: Packet, proxy: ReaderProxy, sample: Sample, fragments: Iterable[int] | None, now: int
@@ -437,10 +492,21 @@ class WriterCore:
         """Whether the allowance is not used up; if it is, `tick` is needed after `pace`."""
         if self._allowance.allows(now):
             return True
-        self._at = min(self._at, now + self.settings.pace)
+        self.due = min(self.due, now + self.settings.pace)
         return False
 
     # --- Heartbeats --------------------------------------------------------------------------------------
+
+    def _expect_and_ask(self, now: int) -> list[bytes]:
+        """A sample leaves for reliable readers: it may be time to ask for acknowledgement with it."""
+        if not self._reliable:
+            return []
+        if self._idle:
+            self._expect(now)
+        self._unasked += 1
+        if now >= self._ask_at or self._unasked >= self._ask_every:
+            return [self._ask(now)]
+        return []
 
     def _ask(self, now: int) -> bytes:
         """A heartbeat for everybody that asks for acknowledgement, to go with a sample."""
@@ -491,7 +557,7 @@ class WriterCore:
         proxy.interval = self.settings.heartbeat_period
         proxy.due = now + proxy.interval
         self._lagging[proxy] = None
-        self._at = min(self._at, proxy.due)
+        self.due = min(self.due, proxy.due)
 
     def _advance(self, proxy: ReaderProxy, acked: int, now: int) -> None:
         """A reader has more than before."""

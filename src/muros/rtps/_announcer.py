@@ -1,0 +1,117 @@
+"""Says that a participant of ours is there (DDSI-RTPS 2.3, 8.5.3: the simple participant discovery protocol).
+
+Often in its first second, then with a steady period, to all addresses known in advance; to the participants
+that are known, where they listen, often enough for the lease; and at once to each that is met. Announcements have no
+acknowledgement: what is lost is said again.
+"""
+
+from collections.abc import Iterable
+from typing import Final
+
+from muros.rtps._agenda import Timed
+from muros.rtps._constants import ENTITYID_SPDP_READER, ENTITYID_SPDP_WRITER
+from muros.rtps._discovery_data import ParticipantData, departure
+from muros.rtps._domain_settings import DomainSettings
+from muros.rtps._endpoint import MILLISECOND, NEVER, Send
+from muros.rtps._peer import Peer
+from muros.rtps._values import INFINITE, Locator
+from muros.rtps._wire import data as data_submessage
+
+__all__ = ["Announcer"]
+
+SHARE: Final = 3
+"""Announcements within a lease, at least."""
+
+
+class Announcer(Timed):
+    """Announces one participant; put it on the agenda to make it begin."""
+
+    __slots__ = (
+        "_burst",
+        "_content",
+        "_data",
+        "_period",
+        "_send",
+        "_sequence",
+        "_settings",
+        "_told",
+        "announce_to",
+        "peers",
+    )
+
+    def __init__(
+        self,
+        data: ParticipantData,
+        send: Send,
+        settings: DomainSettings,
+        announce_to: tuple[Locator, ...],
+        peers: dict[bytes, Peer],
+        now: int,
+    ) -> None:
+        """`peers`: those known, kept up to date by the owner."""
+        super().__init__()
+        self._send = send
+        self._settings = settings
+        self.announce_to = announce_to
+        self.peers = peers
+        # A participant may come back with the GUID of an earlier one, and some peers then wait for a number above
+        # that of its farewell. Time goes on between the two.
+        self._sequence = max(1, now // MILLISECOND)
+        self._told = -NEVER
+        self.change(data, now)
+
+    @property
+    def content(self) -> bytes:
+        """The announcement's payload."""
+        return self._content
+
+    def change(self, data: ParticipantData, now: int) -> None:
+        """The participant says something else of itself from now on: begin anew."""
+        self._data = data
+        self._content = data.payload()
+        self._sequence += 1
+        self._burst = [now + offset for offset in self._settings.announce_burst]
+        self._period = self._settings.announce_period
+        if data.lease < INFINITE:
+            self._period = max(1, min(self._period, data.lease // SHARE))
+        self._told = -NEVER
+
+    def wake(self, now: int) -> int:
+        places = dict.fromkeys(self.announce_to)
+        share = self._data.lease // SHARE
+        if now - self._told >= min(share, self._settings.lease // SHARE):
+            self._told = now
+            places.update(self._peers())
+        self._announce(places)
+        while self._burst and self._burst[0] <= now:
+            del self._burst[0]
+        return self._burst[0] if self._burst else now + self._period
+
+    def tell(self, peer: Peer) -> None:
+        """Somebody new is there."""
+        if not peer.local:
+            self._announce(peer.discovery)
+
+    def leave(self) -> None:
+        """The participant goes."""
+        self._sequence += 1
+        content = data_submessage(
+            ENTITYID_SPDP_READER,
+            ENTITYID_SPDP_WRITER,
+            self._sequence,
+            b"",
+            inline_qos=departure(self._data.guid),
+        )
+        for place in self._peers() | dict.fromkeys(self.announce_to):
+            self._send([content], None, place)
+
+    def _peers(self) -> dict[Locator, None]:
+        """Where others listen, each place once, in a fixed order."""
+        return dict.fromkeys(
+            place for peer in self.peers.values() if not peer.local for place in peer.discovery
+        )
+
+    def _announce(self, places: Iterable[Locator]) -> None:
+        content = data_submessage(ENTITYID_SPDP_READER, ENTITYID_SPDP_WRITER, self._sequence, self._content)
+        for place in places:
+            self._send([content], None, place)

@@ -1,0 +1,98 @@
+"""A participant that others see: where it is, how long it is believed to live, how much it may say."""
+
+from collections.abc import Callable
+from typing import Final
+
+from muros.rtps._agenda import Timed
+from muros.rtps._discovery_data import EndpointData, ParticipantData
+from muros.rtps._endpoint import NEVER, SECOND
+from muros.rtps._reach import INSIDE, Hosts
+from muros.rtps._values import INFINITE, GuidPrefix, Locator
+
+__all__ = ["Budget", "Peer"]
+
+
+class Peer(Timed):
+    """A participant of another process, or one of this as its siblings see it (`local`).
+
+    Gone when nothing is heard of it in its lease, of whatever kind.
+    """
+
+    __slots__ = ("_on_silence", "data", "discovery", "lease", "local", "payload", "seen", "source", "user")
+
+    def __init__(
+        self,
+        data: ParticipantData,
+        payload: bytes,
+        source: Locator | None,
+        now: int,
+        on_silence: Callable[["Peer", int], object] | None,
+    ) -> None:
+        super().__init__()
+        self.data = data
+        self.payload = payload
+        """Its announcement; one that is equal says nothing new."""
+        self.source = source
+        """Where the announcement came from."""
+        self.seen = now
+        """When something came from it."""
+        self.lease = data.lease
+        self.local: Final = on_silence is None
+        self.discovery: tuple[Locator, ...] = ()
+        """Where discovery is sent."""
+        self.user: tuple[Locator, ...] = ()
+        """Where samples are sent, for endpoints that do not say otherwise."""
+        self._on_silence = on_silence
+
+    @property
+    def prefix(self) -> GuidPrefix:
+        """Its GUID prefix."""
+        return self.data.prefix
+
+    def locate(self, hosts: Hosts) -> bool:
+        """Choose anew where to send to it; whether that has changed anything."""
+        before = self.discovery, self.user
+        if self.local:
+            self.discovery = self.user = (INSIDE,)
+        else:
+            data = self.data
+            self.discovery = hosts.choose(data.metatraffic_unicast or data.default_unicast, self.source)
+            self.user = hosts.choose(data.default_unicast or data.metatraffic_unicast, self.source)
+        return before != (self.discovery, self.user)
+
+    def places(self, endpoint: EndpointData, hosts: Hosts) -> tuple[Locator, ...]:
+        """Where to send to an endpoint of it: to its own addresses, else to its participant's."""
+        if self.local or not endpoint.unicast:
+            return self.user
+        return hosts.choose(endpoint.unicast, self.source) or self.user
+
+    def wake(self, now: int) -> int:
+        if self._on_silence is None or self.lease >= INFINITE:
+            return NEVER
+        if now - self.seen < self.lease:
+            return self.seen + self.lease
+        self._on_silence(self, now)
+        return NEVER
+
+
+class Budget:
+    """How many changes may come at once, and in a second thereafter."""
+
+    __slots__ = ("_burst", "_left", "_rate", "_since")
+
+    def __init__(self, burst: int, rate: int, now: int) -> None:
+        self._burst = burst
+        self._rate = rate
+        self._left = burst
+        self._since = now
+
+    def take(self, now: int) -> bool:
+        """Whether one more may come now."""
+        earned = (now - self._since) * self._rate // SECOND
+        if earned > 0:
+            self._left = min(self._burst, self._left + earned)
+            self._since = now
+        if self._left <= 0:
+            return False
+        self._left -= 1
+        return True
