@@ -126,6 +126,7 @@ def test_closed_spaces_and_contexts(space: Space) -> None:
     assert [code for code, _ in problems] == [7, 7]
     assert problems[0][1] == "4 B of rt/value dropped: the context is closed."
     assert not context.ping()
+    assert client.call(AddTwoInts.Request(), timeout=0.05) is None
     assert not Executor(context).spin_some(30.0), "it does not wait for what cannot come"
     with pytest.raises(RclError, match="the context is closed; make a new one"):
         context.node("late")

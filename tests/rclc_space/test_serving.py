@@ -12,7 +12,9 @@ from typing import Any
 
 import pytest
 
-from muros.client import Qos
+from muros.agent import Agent
+from muros.client import Qos, Udp
+from muros.links import UdpLink
 from muros.rclc import Context, Executor, RclError
 from muros.space import Space, open_space
 from muros.space.rclc import _serving
@@ -216,6 +218,41 @@ def test_a_space_that_the_program_s_own_loop_serves() -> None:
             assert not space.closed
 
     asyncio.run(main())
+
+
+def test_a_node_shares_the_space_of_an_agent_in_one_program() -> None:
+    async def main() -> None:
+        link = UdpLink(0, "127.0.0.1")
+        with open_space("local:") as space:
+            context = Context(space)
+            got: list[int] = []
+            listen(context, "value", got)
+            executor = Executor(context)
+            agent = Agent(space)
+            agent.add_link(link)
+            await agent.start()
+            board = run(partial(_board, link.port))
+            while not got:
+                executor.spin_some()
+                await asyncio.sleep(0.001)
+            assert got[0] == 5
+            context.node("ender").publisher(Int32, "end").publish(Int32())
+            while board.is_alive():
+                await asyncio.sleep(0.001)
+            agent.close()
+            context.close()
+
+    asyncio.run(asyncio.wait_for(main(), PATIENCE))
+
+
+def _board(port: int) -> None:
+    """Publishes through the agent until it is told to end."""
+    context = Context(Udp("127.0.0.1", port))
+    publisher = talk(context, "value")
+    context.node("ear").subscription(Int32, "end", lambda message: setattr(context, "running", False))
+    context.node("heart").timer(0.01, lambda: publisher.publish(Int32(data=5)))
+    Executor(context).spin()
+    context.close()
 
 
 def test_a_space_that_a_loop_elsewhere_serves() -> None:

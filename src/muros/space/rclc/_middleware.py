@@ -6,6 +6,7 @@ and is handed on by `spin_once`: so callbacks never run inside the space, and wh
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Set
 from typing import TYPE_CHECKING
@@ -160,7 +161,7 @@ class SpaceMiddleware:
         return taken
 
     def wait(self, timeout: int, /) -> None:
-        """Waits until something may have come, at most `timeout` ms.
+        """Waits until something may have come, at most `timeout` ms; once closed, for nothing and as long.
 
         RclError where the space is served by the asyncio loop that runs this very program.
         """
@@ -169,12 +170,15 @@ class SpaceMiddleware:
                 "waiting would stop the asyncio loop that serves this space: call spin_some() from a task, "
                 "with `await asyncio.sleep(...)` between the calls, or give the context a space of its own"
             )
+        if self.closed:
+            time.sleep(timeout / 1000)
+            return
         self._server.wait(self, timeout / 1000)
         self._fresh = True
 
     def deadline(self, now: int, /) -> int:
         """Milliseconds until `spin_once` is wanted."""
-        return 0 if self.came else _NEVER
+        return 0 if self.came and not self.closed else _NEVER
 
     def ping(self, timeout: int, clock: Callable[[], int], /) -> bool:
         """Whether we are in the graph: there is nobody else to ask."""

@@ -30,7 +30,8 @@ def open_way(way: str | Space, domain: int | None = None) -> SpaceMiddleware:
 
     All contexts of a process that name the same engine stand on one space, whatever their domains. `domain` None
     means that of the URL, else that of the space. ValueError for a URL that names nothing, or two domains at once;
-    RclError for a space that is closed, that is served by another asyncio loop, or that cannot be had here.
+    RclError for a space that is closed, that is served by another asyncio loop, or that cannot be had here. A space
+    given in an asyncio program is served by the program's loop, so that an agent there can share it.
     """
     wrong = import_module("muros.rclc.hosts").WrongValueError
     key: object
@@ -65,40 +66,30 @@ def open_way(way: str | Space, domain: int | None = None) -> SpaceMiddleware:
 
 
 def _prepare(space: Space, key: object, *, owned: bool) -> Ground:
-    """A ground for a space, served by us or by the loop that runs in this thread."""
+    """A ground for a space: served by us, or if it was given by the asyncio loop of its program."""
     serving = server()
+    running = None if owned else asyncio._get_running_loop()
 
     def forget() -> None:
         _grounds.pop(key, None)
 
-    serving.use()
+    serving.use()  # the loop must outlive a failure here
     try:
-        try:
-            space.attach(serving.loop)
-            return Ground(space, serving, forget, owned=owned, served=True)
-        except ClosedError as error:
-            raise RclError(str(error)) from None
-        except SpaceError as error:
-            running = asyncio._get_running_loop()
-            if owned or running is None:
-                raise RclError(_served_elsewhere(error, owned)) from None
+        for loop in filter(None, (running, serving.loop)):
             try:
-                space.attach(running)
-            except SpaceError:
-                raise RclError(_served_elsewhere(error, owned)) from None
-            return Ground(space, serving, forget, owned=False, served=False)
-    except RclError:
-        if owned:
-            space.close()
-        raise
+                space.attach(loop)
+            except ClosedError as error:
+                raise RclError(str(error)) from None
+            except SpaceError as error:
+                reason = str(error)
+                continue
+            return Ground(space, serving, forget, owned=owned, served=loop is serving.loop)
     finally:
         serving.release()
-
-
-def _served_elsewhere(error: SpaceError, owned: bool) -> str:
     if owned:
-        return str(error)
-    return f"{error}. Make the context in the thread of that loop, or give it a space of its own"
+        space.close()
+        raise RclError(reason)
+    raise RclError(f"{reason}. Make the context in the thread of that loop, or give it a space of its own")
 
 
 def _goodbye() -> None:
