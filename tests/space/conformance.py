@@ -66,6 +66,16 @@ def take_all(reader: Reader) -> list[bytes]:
     return bodies
 
 
+class Clock:
+    """Time that passes when told to."""
+
+    def __init__(self) -> None:
+        self.now = 1_795_304_203 * SECOND
+
+    def __call__(self) -> int:
+        return self.now
+
+
 class SpaceConformance:
     """The contract of `muros.space`. Subclasses make the engine."""
 
@@ -1126,3 +1136,40 @@ class SpaceConformance:
                 node.writer(CHATTER, key=wrong)
         with pytest.raises(ValueError, match="empty"):
             space.participant("three", key=b"")
+
+
+class VirtualTime(SpaceConformance):
+    """The contract of an engine whose time is a test's. Subclasses open the space."""
+
+    def open_space(self) -> Space:
+        self.clock = Clock()
+        self.wakes = 0
+        self.due: int | None = None
+        space = self.make()
+        space.on_wake(self.wake)
+        return space
+
+    def make(self) -> Space:
+        """A new space on `clock`."""
+        raise NotImplementedError
+
+    def wake(self) -> None:
+        """Arrange for a tick, as an event loop would."""
+        self.wakes += 1
+        self.due = self.clock.now
+
+    def settle(self, space: Space) -> None:
+        """Tick only when the space has asked for it: what it forgets to ask for does not happen."""
+        rounds = 0
+        while self.due is not None and self.due <= self.clock.now:
+            self.due = space.tick()
+            rounds += 1
+            assert rounds < 10_000
+
+    def pass_time(self, space: Space, ns: int) -> None:
+        end = self.clock.now + ns
+        self.settle(space)
+        while self.due is not None and self.due <= end:
+            self.clock.now = max(self.due, self.clock.now)
+            self.settle(space)
+        self.clock.now = end

@@ -29,59 +29,24 @@ from tests.space.conformance import (
     MS,
     RELIABLE,
     SECOND,
-    SpaceConformance,
+    Clock,
+    VirtualTime,
     numbered,
     take_all,
 )
 
 
-class Clock:
-    """Time that passes when told to."""
-
-    def __init__(self) -> None:
-        self.now = 1_795_304_203 * SECOND
-
-    def __call__(self) -> int:
-        return self.now
-
-
-class TestLocal(SpaceConformance):
+class TestLocal(VirtualTime):
     """The contract."""
 
-    def open_space(self) -> Space:
-        self.clock = Clock()
-        self.wakes = 0
-        space = open_space(
+    def make(self) -> Space:
+        return open_space(
             "local:",
             clock=self.clock,
             resource_limit=self.LIMIT,
             max_blocking_time=self.PATIENCE,
             request_wait=self.REQUEST_WAIT,
         )
-        self.due: int | None = None
-        space.on_wake(self.wake)
-        return space
-
-    def wake(self) -> None:
-        """Arrange for a tick, as an event loop would."""
-        self.wakes += 1
-        self.due = self.clock.now
-
-    def settle(self, space: Space) -> None:
-        """Tick only when the space has asked for it: what it forgets to ask for does not happen."""
-        rounds = 0
-        while self.due is not None and self.due <= self.clock.now:
-            self.due = space.tick()
-            rounds += 1
-            assert rounds < 10_000
-
-    def pass_time(self, space: Space, ns: int) -> None:
-        end = self.clock.now + ns
-        self.settle(space)
-        while self.due is not None and self.due <= end:
-            self.clock.now = max(self.due, self.clock.now)
-            self.settle(space)
-        self.clock.now = end
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ breathes. Graph events and first findings are `notices`: told at the end of the 
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Final, Protocol
@@ -17,7 +18,7 @@ from muros.space._graph import GraphEvent
 from muros.space._loop import LoopDriver
 from muros.space._timers import Timers
 
-__all__ = ["Core", "Limits", "Task"]
+__all__ = ["Core", "Engine", "Limits", "Task"]
 
 SECOND: Final = 10**9
 """Nanoseconds."""
@@ -55,13 +56,26 @@ class Task(Protocol):
         """Call it. Must not raise."""
 
 
+class Engine(Protocol):
+    """What an engine does with time, besides timers and callbacks."""
+
+    def run(self) -> None:
+        """Do what is due."""
+
+    def next(self) -> int | None:
+        """When `run` has something to do, by the clock; None = not by itself."""
+
+
 class Core:
     """The shared part of one space."""
 
-    def __init__(self, clock: Callable[[], int], findings: Findings, limits: Limits) -> None:
+    def __init__(
+        self, clock: Callable[[], int], findings: Findings, limits: Limits, engine: Engine | None = None
+    ) -> None:
         self.clock = clock
         self.findings = findings
         self.limits = limits
+        self.engine = engine
         self.timers = Timers(clock, self.need)
         self.queue: deque[Task] = deque()
         self.draining = False
@@ -89,6 +103,16 @@ class Core:
         if queue:
             self.need(self.clock())
 
+    @contextmanager
+    def hushed(self) -> Iterator[None]:
+        """What is to be told from within is told by `tick`: of an entity whose making has not returned yet."""
+        before, self.draining = self.draining, True
+        try:
+            yield
+        finally:
+            self.draining = before
+        self.poke()
+
     def post(self, task: Task) -> None:
         """Run `task` when the call that goes on now is over; if none drains the queue, at the next tick."""
         self.queue.append(task)
@@ -113,6 +137,8 @@ class Core:
         self._ticking = True
         try:
             self.timers.run()
+            if self.engine is not None:
+                self.engine.run()
             self.drain()
             self.settle()
             summary = self.findings.tick(self.seconds())
@@ -121,6 +147,8 @@ class Core:
         times = [] if summary is None else [int(summary * SECOND) + 1]
         if (timer := self.timers.next()) is not None:
             times.append(timer)
+        if self.engine is not None and (due := self.engine.next()) is not None:
+            times.append(due)
         if self.queue:
             times.append(self.clock())
         self._promised = min(times, default=None)

@@ -100,9 +100,11 @@ class Mismatch(NamedTuple):
     offered: str
     wanted: str
     remedy: str
+    text: str = ""
+    """What there is to say instead, where nothing is offered and wanted in the words of this space."""
 
     def __str__(self) -> str:
-        return f"the reader wants {self.wanted}, the writer offers {self.offered}"
+        return self.text or f"the reader wants {self.wanted}, the writer offers {self.offered}"
 
 
 def mismatches(offered: Qos, wanted: Qos) -> tuple[Mismatch, ...]:

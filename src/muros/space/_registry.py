@@ -21,6 +21,7 @@ class EngineFactory(Protocol):
 
 _ENGINES: Final[dict[str, str | EngineFactory]] = {
     "local": "muros.space.local:open_local",
+    "dds": "muros.space.dds:open_dds",
 }
 """Engines by name; as text "module:factory" they are imported when first used."""
 

@@ -10,14 +10,24 @@ __all__ = [
     "request_overwritten",
     "server_too_slow",
     "several_servers",
+    "types_differ",
 ]
 
 
-def mismatched(core: Core, reader: str, writer: str, topic: str, reasons: tuple[Mismatch, ...]) -> None:
-    """The reader and the writer (named by their owners) do not fit."""
+def types_differ(offered: str, wanted: str) -> Mismatch:
+    """A writer and a reader of one topic have different types."""
+    return Mismatch(
+        "type", f"type {offered}", f"type {wanted}", "Use one type for one topic, or another topic name"
+    )
+
+
+def mismatched(
+    core: Core, reader: str, writer: str, topic: str, reasons: tuple[Mismatch, ...], *, who: str = ""
+) -> None:
+    """The reader and the writer (named by their owners) do not fit; that is `who`'s matter, else the reader's."""
     core.report(
         "type-mismatch" if reasons[0].policy == "type" else "qos-mismatch",
-        who=reader,
+        who=who or reader,
         subject=topic,
         what=f"{reader} gets no {topic} from {writer}",
         why="; ".join(str(reason) for reason in reasons),

@@ -61,14 +61,7 @@ def reasons_against(writer: LocalWriter, reader: LocalReader) -> tuple[Mismatch,
     """Why the two do not fit; empty if they do."""
     types = (writer.topic.type_name, reader.topic.type_name)
     if types[0] != types[1] and all(types):  # who was made by a name alone says no type and meets any
-        return (
-            Mismatch(
-                "type",
-                f"type {writer.topic.type_name}",
-                f"type {reader.topic.type_name}",
-                "Use one type for one topic, or another topic name",
-            ),
-        )
+        return (_reports.types_differ(*types),)
     return mismatches(writer.qos, reader.qos)
 
 

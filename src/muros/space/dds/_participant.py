@@ -1,0 +1,207 @@
+"""Participants of the dds engine: one participant of RTPS each, with its node told to ROS 2."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from muros import rtps
+from muros.rtps import split_guid
+from muros.space._core import Core
+from muros.space._endpoint import EngineEndpoint
+from muros.space._graph import Appeared, Vanished
+from muros.space._participant import READER_KIND, WRITER_KIND, Child, EngineParticipant
+from muros.space._qos import Qos
+from muros.space._values import Service, Topic
+from muros.space.dds._discovery_info import DiscoveryInfo, NodeEntities
+from muros.space.dds._endpoints import DdsEndpoint, DdsReader, DdsWriter
+from muros.space.dds._services import DdsReplier, DdsRequester
+from muros.space.dds._wire_qos import to_wire
+
+if TYPE_CHECKING:
+    from muros.space.dds._domain import DdsDomain
+
+__all__ = ["DdsParticipant"]
+
+
+class DdsParticipant(EngineParticipant):
+    """Somebody in the space. See `muros.space.Participant`."""
+
+    __slots__ = ("home", "keyed", "rtps", "told")
+
+    def __init__(
+        self,
+        core: Core,
+        home: DdsDomain,
+        prefix: bytes,
+        name: str,
+        namespace: str,
+        enclave: str,
+        owner: str,
+        keyed: bool,
+    ) -> None:
+        super().__init__(core, home.number, prefix, name, namespace, enclave, owner)
+        self.home = home
+        self.keyed = keyed
+        """Whether its GIDs come again in another life."""
+        self.told: rtps.LocalWriter | None = None
+        """Tells others of the node."""
+        self.rtps = home.carrier.core.participant(
+            prefix,
+            now=home.now(),
+            name=self.owner,
+            user_data=f"enclave={enclave};".encode(),
+            properties=home.properties,
+            on_event=partial(home.on_event, self),
+        )
+
+    def writer(self, topic: Topic, qos: Qos | None = None, *, key: int | None = None) -> DdsWriter:
+        """A new writer."""
+        qos = self.settled(qos, "dds_writer", topic.name, holds=False)
+        writer = DdsWriter(self, _typed(topic), qos, self.gids(key, WRITER_KIND)[0])
+        self._add(writer, writer)
+        return writer
+
+    def reader(
+        self,
+        topic: Topic,
+        qos: Qos | None = None,
+        on_data: Callable[[Any], object] | None = None,
+        *,
+        key: int | None = None,
+    ) -> DdsReader:
+        """A new reader."""
+        qos = self.settled(qos, "dds_reader", topic.name)
+        reader = DdsReader(self, _typed(topic), qos, self.gids(key, READER_KIND)[0], on_data)
+        self._add(reader, reader)
+        return reader
+
+    def requester(
+        self,
+        service: Service,
+        qos: Qos | None = None,
+        on_reply: Callable[[int, bytes], object] | None = None,
+        *,
+        on_data: Callable[[Any], object] | None = None,
+        key: int | None = None,
+    ) -> DdsRequester:
+        """A new client of a service."""
+        qos = self.settled(qos, "services_default", service.name)
+        writer_gid, reader_gid = self.gids(key, WRITER_KIND, READER_KIND)
+        requester = DdsRequester(self, service, qos, writer_gid, reader_gid, on_reply, on_data)
+        self._add(requester, requester.reader, requester.writer)
+        return requester
+
+    def replier(
+        self,
+        service: Service,
+        qos: Qos | None = None,
+        on_request: Callable[[bytes, bytes], object] | None = None,
+        *,
+        on_data: Callable[[Any], object] | None = None,
+        key: int | None = None,
+    ) -> DdsReplier:
+        """A new server of a service."""
+        qos = self.settled(qos, "services_default", service.name)
+        writer_gid, reader_gid = self.gids(key, WRITER_KIND, READER_KIND)
+        replier = DdsReplier(self, service, qos, writer_gid, reader_gid, on_request, on_data)
+        self._add(replier, replier.writer, replier.reader)
+        return replier
+
+    def close(self) -> None:
+        """Leave the space with everything made here, in one go."""
+        if self.closed:
+            return
+        self.closed = True
+        children, self._children = self._children, []
+        for child in reversed(children):
+            self._forget(child)
+        self.home.leave(self)
+        self.core.settle()
+
+    def in_use(self, gid: bytes) -> bool:
+        """Whether there is an endpoint with this gid."""
+        return gid in self.home.endpoints
+
+    def take_out(self, child: Child) -> None:
+        """Close a child."""
+        for endpoint in self._forget(child):
+            (endpoint.out if isinstance(endpoint, DdsWriter) else endpoint.source).close(self.home.now())
+        self.home.changed(self)
+        self.home.poke()
+
+    def told_entities(self) -> DiscoveryInfo:
+        """What others are to know of its node."""
+        readers: list[bytes] = []
+        writers: list[bytes] = []
+        for child in self._children:
+            for endpoint in _endpoints(child):
+                (writers if isinstance(endpoint, DdsWriter) else readers).append(endpoint.gid)
+        node = NodeEntities(self.namespace, self.name, tuple(readers), tuple(writers))
+        return DiscoveryInfo(self.gid, (node,))
+
+    def _add(self, child: Child, *endpoints: DdsEndpoint) -> None:
+        home = self.home
+        self._children.append(child)
+        with home.making():
+            for endpoint in endpoints:
+                home.endpoints[endpoint.gid] = endpoint
+                if self.core.watchers:
+                    self.core.tell(Appeared(endpoint.info()))
+                self._open(endpoint)
+        home.changed(self)
+        home.poke()
+        self.core.settle()
+
+    def _open(self, endpoint: DdsEndpoint) -> None:
+        """Make its counterpart in RTPS, which tells others of it."""
+        home, topic = self.home, endpoint.topic
+        qos = to_wire(endpoint.qos, self.core.limits)
+        entity = split_guid(endpoint.gid)[1]
+        user_data = f"typehash={endpoint.type_hash};".encode() if endpoint.type_hash else b""
+        if isinstance(endpoint, DdsWriter):
+            endpoint.out = self.rtps.writer(
+                topic.name,
+                topic.type_name,
+                qos,
+                now=home.now(),
+                entity=entity,
+                user_data=user_data,
+                last=home.recall(endpoint.gid),
+                settings=home.writer_settings,
+                on_room=endpoint.room,
+            )
+        else:
+            endpoint.source = self.rtps.reader(
+                topic.name,
+                topic.type_name,
+                qos,
+                endpoint.came,
+                now=home.now(),
+                entity=entity,
+                user_data=user_data,
+            )
+
+    def _forget(self, child: Child) -> tuple[DdsEndpoint, ...]:
+        """Take a child out of the books; RTPS has its endpoints still."""
+        endpoints = _endpoints(child)
+        for endpoint in endpoints:
+            self.home.forget(endpoint)
+            if self.core.watchers:
+                self.core.tell(Vanished(endpoint.info()))
+        child.detach()
+        return endpoints
+
+
+def _endpoints(child: Child) -> tuple[DdsEndpoint, ...]:
+    if isinstance(child, DdsWriter | DdsReader):
+        return (child,)
+    assert not isinstance(child, EngineEndpoint)
+    return (child.reader, child.writer)  # type: ignore[return-value]
+
+
+def _typed(topic: Topic) -> Topic:
+    if not topic.type_name:
+        raise ValueError(f"{topic.name} has no type; in the dds space every topic needs one")
+    return topic
