@@ -1,7 +1,7 @@
 """Grounds: the spaces that contexts stand on, and who of them is told what a space reports.
 
-Contexts that are opened by URL share one space for each engine, so that they meet; it is closed with the last of
-them. A space that was given is the giver's: contexts leave it, and tell only of their own nodes.
+Contexts that are opened by URL share one space for each engine and domain, so that they meet; it is closed with the
+last of them. A space that was given is the giver's: contexts leave it, and tell only of their own nodes.
 """
 
 from __future__ import annotations

@@ -22,47 +22,50 @@ LARGEST_DOMAIN: Final = 232
 """The ports of a larger one do not exist (DDSI-RTPS 2.3, 9.6.1.1)."""
 
 _grounds: Final[dict[object, Ground]] = {}
-"""By URL, or by the identity of a space that was given."""
+"""By URL with the domain, or by the identity of a space that was given."""
 
 
 def open_way(way: str | Space, domain: int | None = None) -> SpaceMiddleware:
     """What carries a context whose way is a URL (`dds:`, `dds:42`, `local:`) or a space.
 
-    All contexts of a process that name the same engine stand on one space, whatever their domains. `domain` None
-    means that of the URL, else that of the space. ValueError for a URL that names nothing, or two domains at once;
-    RclError for a space that is closed, that is served by another asyncio loop, or that cannot be had here. A space
-    given in an asyncio program is served by the program's loop, so that an agent there can share it.
+    All contexts of a process that name the same engine and domain stand on one space. `domain` None means that of the
+    URL, else that of the space. ValueError for a URL that names nothing, or two domains at once; RclError for a space
+    that is closed, that is served by another asyncio loop, or that cannot be had here. A space given in an asyncio
+    program is served by the program's loop, so that an agent there can share it.
     """
-    wrong = import_module("muros.rclc.hosts").WrongValueError
-    key: object
-    if isinstance(way, str):
-        scheme, colon, rest = way.partition(":")
-        numbered = rest.isascii() and rest.isdigit()
-        if numbered:
-            if domain is not None and domain != int(rest):
-                raise wrong(f"{way!r} with domain_id={domain}: name the domain once")
-            domain = int(rest)
-            if domain > LARGEST_DOMAIN:
-                raise wrong(f"{way!r}: a domain is from 0 to {LARGEST_DOMAIN}")
-        url = f"{scheme}:" if colon and numbered else way
-        key = url
-    else:
-        url, key = "", id(way)
     serving = server()
     with serving.lock:
-        ground = _grounds.get(key)
+        ground = _of_url(way, domain) if isinstance(way, str) else _grounds.get(id(way))
         if ground is None:
-            if isinstance(way, str):
-                try:
-                    space = open_space(url)
-                except UnknownEngineError as error:
-                    raise wrong(f"{error}. Through an agent: Context(Udp('127.0.0.1', 8888))") from None
-                except SpaceError as error:
-                    raise wrong(str(error)) from None
-            else:
-                space = way
-            ground = _grounds[key] = _prepare(space, key, owned=isinstance(way, str))
+            assert not isinstance(way, str)
+            ground = _grounds[id(way)] = _prepare(way, id(way), owned=False)
         return SpaceMiddleware(ground, ground.space.domain if domain is None else domain)
+
+
+def _of_url(url: str, domain: int | None) -> Ground:
+    """The ground of a URL, made if there is none yet."""
+    wrong = import_module("muros.rclc.hosts").WrongValueError
+    engine, _, rest = url.partition(":")
+    if rest.isascii() and rest.isdigit():
+        if int(rest) > LARGEST_DOMAIN:
+            raise wrong(f"{url!r}: a domain is from 0 to {LARGEST_DOMAIN}")
+        if domain is not None and domain != int(rest):
+            raise wrong(f"{url!r} with domain_id={domain}: name the domain once")
+    elif not rest and domain is not None:
+        rest = str(domain)
+    try:
+        space = open_space(f"{engine}:{rest}" if rest else url)
+    except UnknownEngineError as error:
+        raise wrong(f"{error}. Through an agent: Context(Udp('127.0.0.1', 8888))") from None
+    except SpaceError as error:
+        raise wrong(str(error)) from None
+    key = f"{engine}:{space.domain}" if not rest or rest.isdigit() else url
+    ground = _grounds.get(key)
+    if ground is None:
+        ground = _grounds[key] = _prepare(space, key, owned=True)
+    else:
+        space.close()  # it was never in use
+    return ground
 
 
 def _prepare(space: Space, key: object, *, owned: bool) -> Ground:
