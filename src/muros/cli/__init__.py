@@ -18,6 +18,7 @@ COMMANDS = {
     "interface": ("muros.cli.interface", "show, list and generate message, service and action types"),
     "topic": ("muros.cli.topic", "list, show, publish and measure topics of the ROS 2 graph"),
     "node": ("muros.cli.node", "list and show nodes of the ROS 2 graph"),
+    "doctor": ("muros.cli.doctor", "say what is wrong with this host and with the graph"),
     "graph": ("muros.cli.graph", "show who talks to whom, as text or as a picture"),
     "service": ("muros.cli.service", "list and call services of the ROS 2 graph"),
 }

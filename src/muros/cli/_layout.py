@@ -39,8 +39,8 @@ class Layout:
 
     width: float
     height: float
-    centres: dict[Vertex, Point] = field(default_factory=dict)
-    routes: dict[Edge, list[Point]] = field(default_factory=dict)
+    centres: dict[Any, Point] = field(default_factory=dict)
+    routes: dict[tuple[Any, Any], list[Point]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

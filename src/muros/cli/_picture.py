@@ -247,7 +247,6 @@ def to_svg(view: View) -> str:
             curve = _curve(ends, layout, sizes)
             lines.append(_path(curve, "misfit" if why else "", why or _described(ends, qos)))
     for thing, (x, y) in layout.centres.items():
-        assert isinstance(thing, Thing)
         lines.append(_shape(thing, x, y, sizes[thing][0], view.things[thing]))
     return "\n".join([*lines, "</g>", "</svg>", ""])
 
