@@ -1,8 +1,8 @@
 """Domains on a simulated network, in virtual time: what processes of several computers will be, for tests."""
 
-from typing import Any
+from typing import Any, TypeVar
 
-from muros.links.testing import SimulatedNetwork
+from muros.links.testing import Datagram, SimulatedNetwork
 from muros.rtps import (
     Addresses,
     DomainCore,
@@ -18,6 +18,8 @@ from muros.rtps import (
     Reliability,
     udp4,
 )
+
+Kind = TypeVar("Kind")
 
 MS = 10**6
 SECOND = 10**9
@@ -130,7 +132,7 @@ class World:
     """Processes on one network."""
 
     def __init__(
-        self, seed: int = 0, *, delay: tuple[float, float] = (0.1 * MS, 0.5 * MS), **faults: float
+        self, seed: int = 0, *, delay: tuple[float, float] = (0.1 * MS, 0.5 * MS), **faults: Any
     ) -> None:
         self.network = SimulatedNetwork(seed, delay=delay, **faults)
         self.processes: list[Process] = []
@@ -141,6 +143,17 @@ class World:
         self.processes.append(made)
         return made
 
+    def record(self) -> list[Datagram]:
+        """Everything that is sent from now on."""
+        sent: list[Datagram] = []
+
+        def tap(datagram: Datagram) -> bool:
+            sent.append(datagram)
+            return True
+
+        self.network.tap = tap
+        return sent
+
     def run(self, span: float) -> None:
         """Let `span` ns pass."""
         self.network.run(self.network.now + span, *[process.act for process in self.processes])
@@ -150,3 +163,8 @@ def payload(number: int, size: int = 16) -> bytes:
     """A recognizable payload, encapsulation included; `size` a multiple of 4, since DATA is padded to that."""
     head = b"\0\1\0\0" + number.to_bytes(8, "little")
     return (head * (size // len(head) + 1))[:size]
+
+
+def of(events: list[Any], kind: type[Kind]) -> list[Kind]:
+    """The events of one kind."""
+    return [event for event in events if isinstance(event, kind)]

@@ -20,7 +20,7 @@ module                            holds
 from muros.rtps._constants import MAX_DOMAIN, BuiltinEndpoint, Ports, StatusInfo, vendor_name
 from muros.rtps._discovery_data import EndpointData, InvalidDiscoveryData, ParticipantData, user_values
 from muros.rtps._domain import DomainCore
-from muros.rtps._domain_settings import DOMAIN_DEFAULTS, Addresses, DomainSettings, Transmit
+from muros.rtps._domain_settings import DOMAIN_DEFAULTS, NOWHERE, Addresses, DomainSettings, Transmit
 from muros.rtps._endpoint import Problem
 from muros.rtps._events import InvalidMessage
 from muros.rtps._local import LocalReader, LocalWriter, OnSample, Received
@@ -70,6 +70,7 @@ __all__ = [
     "DOMAIN_DEFAULTS",
     "INFINITE",
     "MAX_DOMAIN",
+    "NOWHERE",
     "READER_QOS",
     "WRITER_QOS",
     "XCDR1",

@@ -5,14 +5,14 @@ that are known, where they listen, often enough for the lease; and at once to ea
 acknowledgement: what is lost is said again.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Final
 
 from muros.rtps._agenda import Timed
 from muros.rtps._constants import ENTITYID_SPDP_READER, ENTITYID_SPDP_WRITER
 from muros.rtps._discovery_data import ParticipantData, departure
 from muros.rtps._domain_settings import DomainSettings
-from muros.rtps._endpoint import MILLISECOND, NEVER, Send
+from muros.rtps._endpoint import NEVER, Send
 from muros.rtps._peer import Peer
 from muros.rtps._values import INFINITE, Locator
 from muros.rtps._wire import data as data_submessage
@@ -27,17 +27,9 @@ class Announcer(Timed):
     """Announces one participant; put it on the agenda to make it begin."""
 
     __slots__ = (
-        "_burst",
-        "_content",
-        "_data",
-        "_period",
-        "_send",
-        "_sequence",
-        "_settings",
-        "_told",
-        "announce_to",
-        "peers",
-    )
+        "_burst", "_content", "_data", "_number", "_period", "_send", "_sequence", "_settings", "_told",
+        "announce_to", "peers",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -46,17 +38,17 @@ class Announcer(Timed):
         settings: DomainSettings,
         announce_to: tuple[Locator, ...],
         peers: dict[bytes, Peer],
+        number: Callable[[], int],
         now: int,
     ) -> None:
-        """`peers`: those known, kept up to date by the owner."""
+        """`peers`: those known, kept up to date by the owner. number: gives numbers above all that it gave before."""
         super().__init__()
         self._send = send
         self._settings = settings
         self.announce_to = announce_to
         self.peers = peers
-        # A participant may come back with the GUID of an earlier one, and some peers then wait for a number above
-        # that of its farewell. Time goes on between the two.
-        self._sequence = max(1, now // MILLISECOND)
+        self._number = number
+        self._sequence = 0
         self._told = -NEVER
         self.change(data, now)
 
@@ -69,7 +61,7 @@ class Announcer(Timed):
         """The participant says something else of itself from now on: begin anew."""
         self._data = data
         self._content = data.payload()
-        self._sequence += 1
+        self._sequence = self._number()
         self._burst = [now + offset for offset in self._settings.announce_burst]
         self._period = self._settings.announce_period
         if data.lease < INFINITE:
@@ -94,7 +86,7 @@ class Announcer(Timed):
 
     def leave(self) -> None:
         """The participant goes."""
-        self._sequence += 1
+        self._sequence = self._number()
         content = data_submessage(
             ENTITYID_SPDP_READER,
             ENTITYID_SPDP_WRITER,

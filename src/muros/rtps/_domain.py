@@ -21,7 +21,7 @@ from muros.rtps._agenda import Agenda
 from muros.rtps._constants import ENTITYID_SPDP_WRITER, PROTOCOL_VERSION, StatusInfo
 from muros.rtps._discovery_data import EndpointData, InvalidDiscoveryData, ParticipantData, key_untrusted
 from muros.rtps._domain_settings import DOMAIN_DEFAULTS, NOWHERE, Addresses, DomainSettings, Transmit
-from muros.rtps._endpoint import SECOND, Send
+from muros.rtps._endpoint import MILLISECOND, SECOND, Send
 from muros.rtps._events import AckNack, Data, Event, InfoReply, InvalidMessage, NackFrag
 from muros.rtps._liveliness import WriterLease
 from muros.rtps._news import DomainProblem, DomainReport, ParticipantChanged, ParticipantEvent, Why
@@ -40,6 +40,12 @@ TELL_AGAIN: Final = 10 * SECOND
 
 TOLD_MOST: Final = 256
 """Problems remembered as reported."""
+
+OVERTAKEN: Final = 2 * SECOND
+"""For so long an announcement may be on its way that was overtaken by a newer one, or by a farewell."""
+
+GONE_MOST: Final = 256
+"""Farewells remembered."""
 
 PARSED_MOST: Final = 256
 """Announcements of endpoints remembered as parsed, since every participant of ours hears them."""
@@ -89,6 +95,8 @@ class DomainCore:
         self._writers: dict[_Key, WriterPort] = {}
         self._replies: dict[_Key, tuple[WriterPort, ...]] = {}
         self._reply: tuple[GuidPrefix, Locator] | None = None
+        self._number = 0
+        self._gone: dict[GuidPrefix, tuple[int, int]] = {}
         self._parsed: dict[bytes, EndpointData] = {}
         self._told: dict[tuple[DomainProblem, GuidPrefix], int] = {}
 
@@ -170,7 +178,8 @@ class DomainCore:
         self.addresses = addresses
         self.hosts = Hosts(addresses)
         for peer in self.peers.values():
-            if peer.locate(self.hosts) or not peer.local:
+            if not peer.local:
+                self._locate(peer)
                 for participant in self._participants.values():
                     participant.update(peer, None, now)
         for participant in self._participants.values():
@@ -246,6 +255,15 @@ class DomainCore:
                 self.report(DomainProblem.QUEUE_FULL, prefix, counters["dropped"])
 
         return send
+
+    def number(self) -> int:
+        """The number of a new announcement.
+
+        A participant may come back, even in another process, with the GUID of an earlier one, and peers then wait for
+        a number above that of its farewell: so numbers follow the clock.
+        """
+        self._number = max(self._number + 1, self.now // MILLISECOND)
+        return self._number
 
     def add_writer(self, port: WriterPort) -> None:
         """Events for this writer are handed to it from now on."""
@@ -469,12 +487,15 @@ class DomainCore:
         peer = self.peers.get(prefix)
         if peer is not None and event.payload == peer.payload and event.payload:
             return
+        number, at = (peer.sequence, peer.told) if peer is not None else self._gone.get(prefix, (0, 0))
+        if event.sequence < number and now - at < OVERTAKEN:
+            return
         if event.destination is not None and event.destination not in self._participants:
             self.counters["unmatched"] += 1
             return
         try:
             if not event.payload or event.key or status_info(event.inline_qos) & ~StatusInfo.FILTERED:
-                self._departed(key_untrusted(event.payload, event.inline_qos), prefix, now)
+                self._departed(key_untrusted(event.payload, event.inline_qos), event, now)
                 return
             data = ParticipantData.parse_untrusted(event.payload)
         except (InvalidDiscoveryData, InvalidParameters) as error:
@@ -485,11 +506,11 @@ class DomainCore:
         elif not self._is_of_this_domain(data, source):
             self.counters["foreign"] += 1
         elif peer is not None:
-            self._update(peer, data, event.payload, source, now)
+            self._update(peer, data, event, source, now)
         elif sum(not other.local for other in self.peers.values()) >= self.settings.peers:
             self.refuse(DomainProblem.TOO_MANY_PEERS, b"", prefix.hex(), self.settings.peers)
         else:
-            self._meet(data, event.payload, source, now)
+            self._meet(data, event, source, now)
 
     def _is_of_this_domain(self, data: ParticipantData, source: Locator | None) -> bool:
         if data.domain in (None, self.domain) and data.domain_tag == self.settings.domain_tag:
@@ -498,8 +519,9 @@ class DomainCore:
         self.report(DomainProblem.FOREIGN_DOMAIN, b"", number, data.domain_tag, source)
         return False
 
-    def _meet(self, data: ParticipantData, payload: bytes, source: Locator | None, now: int) -> None:
-        peer = Peer(data, payload, source, now, self._silent)
+    def _meet(self, data: ParticipantData, event: Data, source: Locator | None, now: int) -> None:
+        peer = Peer(data, event.payload, source, now, self._silent)
+        peer.sequence = event.sequence
         peer.lease = max(peer.lease, self.settings.lease_least)
         self._locate(peer)
         self.peers[peer.prefix] = peer
@@ -508,9 +530,10 @@ class DomainCore:
             participant.meet(peer, now)
 
     def _update(
-        self, peer: Peer, data: ParticipantData, payload: bytes, source: Locator | None, now: int
+        self, peer: Peer, data: ParticipantData, event: Data, source: Locator | None, now: int
     ) -> None:
-        before, peer.data, peer.payload, peer.source = peer.data, data, payload, source
+        before, peer.data, peer.payload, peer.source = peer.data, data, event.payload, source
+        peer.sequence, peer.told = event.sequence, now
         peer.lease = max(data.lease, self.settings.lease_least)
         self._locate(peer)
         self.agenda.at(peer, now + peer.lease)
@@ -530,11 +553,16 @@ class DomainCore:
                 peer.source,
             )
 
-    def _departed(self, guid: Guid, prefix: GuidPrefix, now: int) -> None:
+    def _departed(self, guid: Guid, event: Data, now: int) -> None:
+        prefix = event.source
         peer = self.peers.get(prefix)
         if guid[:PREFIX_SIZE] != prefix:
             self.refuse(DomainProblem.PREFIX_MISMATCH, prefix if peer else b"", guid.hex())
         elif peer is not None:
+            self._gone.pop(prefix, None)
+            if len(self._gone) >= GONE_MOST:
+                del self._gone[next(iter(self._gone))]
+            self._gone[prefix] = event.sequence, now
             self._lose(peer, Why.LEFT, now)
 
     def _silent(self, peer: Peer, now: int) -> None:

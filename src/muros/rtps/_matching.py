@@ -15,6 +15,9 @@ from muros.rtps._values import INFINITE, split_guid
 
 __all__ = ["mismatches", "partitions_meet"]
 
+MAX_PARTITION: Final = 256
+"""Characters of the name of a partition; longer ones meet nobody, for patterns cost time."""
+
 MAX_PARTITION_PAIRS: Final = 10_000
 """Comparisons of partition names of one writer and one reader; pairs with more do not meet."""
 
@@ -72,6 +75,8 @@ def partitions_meet(ours: tuple[str, ...], theirs: tuple[str, ...]) -> bool:
 
 
 def _meet(one: str, other: str) -> bool:
+    if len(one) > MAX_PARTITION or len(other) > MAX_PARTITION:
+        return False
     if _is_pattern(one):
         return not _is_pattern(other) and fnmatchcase(other, one)
     if _is_pattern(other):

@@ -73,11 +73,11 @@ class ParticipantCore:
         self._readers: dict[EntityId, LocalReader] = {}
         self._locals: dict[str, list[LocalWriter | LocalReader]] = {}
         self._topics: dict[str, dict[Guid, EndpointData]] = {}
-        self._leases: dict[Guid, WriterLease] = {}
+        self._leases: dict[GuidPrefix, dict[Guid, WriterLease]] = {}
         self._next_key = FIRST_KEY
         self._discovery = Discovery(self)
         self._announcer = Announcer(
-            data, self.send, owner.settings, owner.addresses.announce_to, owner.peers, now
+            data, self.send, owner.settings, owner.addresses.announce_to, owner.peers, owner.number, now
         )
         self._automatic = Assertions(False, owner.agenda, self._discovery.say_alive)
         self._manual = Assertions(True, owner.agenda, self._discovery.say_alive)
@@ -313,10 +313,9 @@ class ParticipantCore:
 
     def asserted(self, assertion: Assertion, now: int) -> None:
         """Somebody says that it, or what it speaks for, is alive."""
-        for guid, lease in self._leases.items():
-            if guid.startswith(assertion.prefix) and (
-                lease.kind == Liveliness.AUTOMATIC
-                or (assertion.manual and lease.kind == Liveliness.MANUAL_BY_PARTICIPANT)
+        for lease in self._leases.get(assertion.prefix, {}).values():
+            if lease.kind == Liveliness.AUTOMATIC or (
+                assertion.manual and lease.kind == Liveliness.MANUAL_BY_PARTICIPANT
             ):
                 lease.touch(now)
 
@@ -422,7 +421,7 @@ class ParticipantCore:
             local.drop(guid)
             self.owner.remove_route(guid, local)
             local.core.unmatch_writer(guid)
-            lease = self._leases.get(guid)
+            lease = self._lease(guid)
             if lease is not None:
                 lease.readers.pop(local.guid, None)
                 if not lease.readers:
@@ -433,7 +432,7 @@ class ParticipantCore:
     def _watch(self, local: LocalReader, remote: EndpointData, peer: Peer, now: int) -> None:
         """Watch whether a writer is alive, if its lease ends."""
         guid, qos = remote.guid, remote.qos
-        lease = self._leases.get(guid)
+        lease = self._lease(guid)
         period = max(qos.lease, self.owner.settings.lease_least)
         if lease is not None and (lease.kind, lease.lease) != (qos.liveliness, period):
             readers = lease.readers
@@ -444,15 +443,22 @@ class ParticipantCore:
         if qos.lease >= INFINITE:
             return
         if lease is None:
-            lease = self._leases[guid] = WriterLease(
+            lease = WriterLease(
                 guid, qos.liveliness, period, peer, self.owner.agenda, self._alive_or_not, now
             )
             lease.readers.update(readers)
+            self._leases.setdefault(peer.prefix, {})[guid] = lease
             self.owner.add_lease(lease)
         lease.readers[local.guid] = None
 
+    def _lease(self, writer: Guid) -> WriterLease | None:
+        return self._leases.get(writer[:12], {}).get(writer)
+
     def _forget_lease(self, lease: WriterLease) -> None:
-        del self._leases[lease.guid]
+        leases = self._leases[lease.guid[:12]]
+        del leases[lease.guid]
+        if not leases:
+            del self._leases[lease.guid[:12]]
         self.owner.remove_lease(lease)
         self.owner.agenda.forget(lease)
 

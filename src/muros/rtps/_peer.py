@@ -18,7 +18,19 @@ class Peer(Timed):
     Gone when nothing is heard of it in its lease, of whatever kind.
     """
 
-    __slots__ = ("_on_silence", "data", "discovery", "lease", "local", "payload", "seen", "source", "user")
+    __slots__ = (
+        "_on_silence",
+        "data",
+        "discovery",
+        "lease",
+        "local",
+        "payload",
+        "seen",
+        "sequence",
+        "source",
+        "told",
+        "user",
+    )
 
     def __init__(
         self,
@@ -34,6 +46,10 @@ class Peer(Timed):
         """Its announcement; one that is equal says nothing new."""
         self.source = source
         """Where the announcement came from."""
+        self.sequence = 0
+        """The announcement's number, ..."""
+        self.told = now
+        """... and when it came."""
         self.seen = now
         """When something came from it."""
         self.lease = data.lease
@@ -49,16 +65,14 @@ class Peer(Timed):
         """Its GUID prefix."""
         return self.data.prefix
 
-    def locate(self, hosts: Hosts) -> bool:
-        """Choose anew where to send to it; whether that has changed anything."""
-        before = self.discovery, self.user
+    def locate(self, hosts: Hosts) -> None:
+        """Choose anew where to send to it."""
         if self.local:
             self.discovery = self.user = (INSIDE,)
         else:
             data = self.data
             self.discovery = hosts.choose(data.metatraffic_unicast or data.default_unicast, self.source)
             self.user = hosts.choose(data.default_unicast or data.metatraffic_unicast, self.source)
-        return before != (self.discovery, self.user)
 
     def places(self, endpoint: EndpointData, hosts: Hosts) -> tuple[Locator, ...]:
         """Where to send to an endpoint of it: to its own addresses, else to its participant's."""
