@@ -21,7 +21,7 @@ def register(subparsers: Any) -> None:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    actions = parser.add_subparsers(required=True, metavar="show | list | generate")
+    actions = parser.add_subparsers(required=True, metavar="show | list | proto | generate")
     show = _command(actions, "show", _show, "print the definition of types")
     show.add_argument("types", nargs="+", metavar="TYPE", help="std_msgs/msg/Int32, or short std_msgs/Int32")
     show.add_argument("--full", action="store_true", help="with the definitions of nested types behind it")
@@ -32,6 +32,14 @@ def register(subparsers: Any) -> None:
     listing = _command(actions, "list", _list, "list the names of all types")
     listing.add_argument("packages", nargs="*", metavar="PACKAGE", help="only those of these packages")
     listing.add_argument("--packages", dest="names_only", action="store_true", help="list packages instead")
+    kinds = listing.add_mutually_exclusive_group()
+    for flag, name, kind in (("-m", "msgs", "msg"), ("-s", "srvs", "srv"), ("-a", "actions", "action")):
+        kinds.add_argument(
+            flag, f"--only-{name}", dest="kind", action="store_const", const=kind, help=f"only {name}"
+        )
+    proto = _command(actions, "proto", _proto, "print the values of a message as YAML, to be filled in")
+    proto.add_argument("type", metavar="TYPE", help="of a service the request, of an action the goal")
+    proto.add_argument("--no-quotes", action="store_true", help="without quotes around it")
     generate = _command(
         actions, "generate", _generate, "write Python packages of the types and of all they need"
     )
@@ -111,9 +119,25 @@ def _list(arguments: argparse.Namespace) -> None:
             raise interfaces.InterfaceError(
                 f"unknown package {package!r}; see muros interface list --packages"
             )
+    if arguments.kind:
+        names = [name for name in names if name.split("/")[1] == arguments.kind]
+        found = {name.partition("/")[0] for name in names}
     chosen = set(arguments.packages) or found
     lines = sorted(chosen) if arguments.names_only else [n for n in names if n.partition("/")[0] in chosen]
     print("\n".join(lines))
+
+
+def _proto(arguments: argparse.Namespace) -> None:
+    from muros import interfaces
+    from muros.cli._values import Look, to_yaml
+
+    made = interfaces.load(arguments.type)
+    if issubclass(made, interfaces.ServiceType):
+        made = made.Request
+    elif issubclass(made, interfaces.ActionType):
+        made = made.Goal
+    quote = "" if arguments.no_quotes else '"'
+    print(f"{quote}{to_yaml(made(), Look())}{quote}")
 
 
 def _generate(arguments: argparse.Namespace) -> None:
