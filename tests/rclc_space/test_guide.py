@@ -1,27 +1,25 @@
 """The programs of the guide do straight on a space what they do through an agent."""
 
 import threading
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from muros.rclc import Executor
 from tests.rclc_space.ways import PATIENCE, Direct, Stage
 from tests.test_guides import programs
 
-from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32, String
 
 GUIDE = programs("docs/write-a-node.md")
-URL = "local:"
 
 
 class Running:
     """A program of the guide on a thread of its own, and what it prints."""
 
-    def __init__(self, number: int) -> None:
-        source = GUIDE[number].replace('Udp("127.0.0.1", 8888)', f'"{URL}"')
-        assert f'"{URL}"' in source
+    def __init__(self, number: int, url: str) -> None:
+        source = GUIDE[number].replace('Udp("127.0.0.1", 8888)', '"local:"').replace('"local:"', f'"{url}"')
+        assert f'Context("{url}")' in source
         self.lines: list[str] = []
         self.names: dict[str, Any] = {"print": self._print}
         self._thread = threading.Thread(target=lambda: exec(source, self.names), daemon=True)
@@ -42,37 +40,37 @@ class Running:
 
 
 @pytest.fixture
-def stage() -> Any:
+def stage(url: str) -> Iterator[Stage]:
     """Nodes of ours."""
-    made = Stage(Direct(URL))
+    made = Stage(Direct(url))
     yield made
     made.close()
 
 
-def test_the_counter(stage: Stage) -> None:
+def test_the_counter(stage: Stage, url: str) -> None:
     bench = stage.node("bench")
     got: list[int] = []
     bench.subscription(Int32, "/demo/count", lambda message: got.append(message.data))
     say = bench.publisher(String, "/demo/say")
-    running = Running(0)
+    running = Running(0, url)
     stage.until(lambda: len(got) > 1 and running.lines, lambda: say.publish(String(data="hello")))
     assert got[:2] == [1, 2]
     assert running.lines[0] == "hello"
     running.leave()
 
 
-def test_the_service_and_who_asks() -> None:
-    adder = Running(1)
-    asker = Running(2)
+def test_the_service_and_who_asks(url: str) -> None:
+    adder = Running(1, url)
+    asker = Running(2, url)
     asker.end()
     assert asker.lines == ["66"]
     adder.leave()
 
 
-def test_the_trigger_waits_for_both(stage: Stage) -> None:
+def test_the_trigger_waits_for_both(stage: Stage, url: str) -> None:
     bench = stage.node("bench")
     laser, imu = bench.publisher(Int32, "/laser"), bench.publisher(Int32, "/imu")
-    running = Running(3)
+    running = Running(3, url)
     stage.meet(laser, imu)
     for i in range(5):
         laser.publish(Int32(data=i))
@@ -84,18 +82,7 @@ def test_the_trigger_waits_for_both(stage: Stage) -> None:
     running.leave()
 
 
-def test_two_contexts_in_one_process() -> None:
-    running = Running(4)
+def test_two_contexts_in_one_process(url: str) -> None:
+    running = Running(4, url)
     running.end()
     assert running.lines == ["42"]
-
-
-def test_a_client_of_its_own_executor(stage: Stage) -> None:
-    server = stage.node("server")
-    server.service(AddTwoInts, "add", lambda request: AddTwoInts.Response(sum=request.a * 2))
-    client = server.client(AddTwoInts, "add")
-    answers: list[int] = []
-    client.send(AddTwoInts.Request(a=4), lambda reply: answers.append(reply.sum))
-    Executor(server.context)
-    stage.until(lambda: answers)
-    assert answers == [8]

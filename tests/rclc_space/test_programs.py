@@ -162,6 +162,17 @@ def test_a_service_may_answer_later(stage: Stage) -> None:
     assert sorted(answers) == [(0, 1), (1, 2)], "each got its own"
 
 
+def test_a_context_asks_its_own_server(stage: Stage) -> None:
+    node = stage.node("node")
+    node.service(AddTwoInts, "add", add)
+    client = node.client(AddTwoInts, "add")
+    stage.meet(client)
+    answers: list[int] = []
+    stage.until(partial(client.send, AddTwoInts.Request(a=4, b=4), lambda reply: answers.append(reply.sum)))
+    stage.until(lambda: answers)
+    assert answers == [8]
+
+
 def test_call_waits_for_the_reply_of_a_server_in_another_thread(stage: Stage) -> None:
     server = stage.way.open()
     server.node("server").service(AddTwoInts, "add", add)

@@ -76,10 +76,10 @@ class Counting(_serving._Selector):
         return super().select(timeout)
 
 
-def test_waiting_is_sleeping(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_waiting_is_sleeping(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(_serving, "_Selector", Counting)
     monkeypatch.setattr(Counting, "count", 0)
-    context = Context("local:")
+    context = Context(url)
     calls: list[int] = []
     context.node("node").timer(0.05, lambda: calls.append(1))
     executor = Executor(context)
@@ -89,8 +89,8 @@ def test_waiting_is_sleeping(monkeypatch: pytest.MonkeyPatch) -> None:
     context.close()
 
 
-def test_what_comes_from_another_thread_wakes_who_waits() -> None:
-    here, there = Context("local:"), Context("local:")
+def test_what_comes_from_another_thread_wakes_who_waits(url: str) -> None:
+    here, there = Context(url), Context(url)
     got: list[int] = []
     listen(there, "value", got)
     publisher = talk(here, "value")
@@ -105,8 +105,8 @@ def test_what_comes_from_another_thread_wakes_who_waits() -> None:
     there.close()
 
 
-def test_of_two_that_wait_one_serves_and_hands_over() -> None:
-    contexts = [Context("local:") for _ in range(3)]
+def test_of_two_that_wait_one_serves_and_hands_over(url: str) -> None:
+    contexts = [Context(url) for _ in range(3)]
     got: list[list[int]] = [[], []]
     for i in range(2):
         listen(contexts[i], f"value_{i}", got[i])
@@ -130,9 +130,9 @@ def test_of_two_that_wait_one_serves_and_hands_over() -> None:
         context.close()
 
 
-def test_publishing_from_many_threads() -> None:
-    talkers = [Context("local:") for _ in range(3)]
-    listener = Context("local:")
+def test_publishing_from_many_threads(url: str) -> None:
+    talkers = [Context(url) for _ in range(3)]
+    listener = Context(url)
     got: list[int] = []
     listener.node("listener").subscription(
         Int32, "value", lambda message: got.append(message.data), Qos(depth=1000)
@@ -157,8 +157,8 @@ def test_publishing_from_many_threads() -> None:
 
 
 @pytest.mark.parametrize("end", ["close", "wake"])
-def test_ending_a_wait_from_another_thread(end: str) -> None:
-    context = Context("local:")
+def test_ending_a_wait_from_another_thread(url: str, end: str) -> None:
+    context = Context(url)
     middleware: Any = context.middleware
     thread = run(lambda: middleware.wait(60_000))
     asleep()
@@ -167,9 +167,9 @@ def test_ending_a_wait_from_another_thread(end: str) -> None:
     context.close()
 
 
-def test_inside_an_asyncio_program() -> None:
+def test_inside_an_asyncio_program(url: str) -> None:
     async def main() -> list[int]:
-        talker, listener = Context("local:"), Context("local:")
+        talker, listener = Context(url), Context(url)
         got: list[int] = []
         listen(listener, "value", got)
         publisher = talk(talker, "value")
@@ -286,10 +286,10 @@ def _report(space: Space, work: Callable[[], object]) -> None:
     cancel()
 
 
-def test_nothing_is_left_of_the_last_context() -> None:
-    Context("local:").close()
+def test_nothing_is_left_of_the_last_context(url: str) -> None:
+    Context(url).close()
     assert _serving.server()._loop is None
-    context = Context("local:")
+    context = Context(url)
     loop: Any = _serving.server().loop
     context.close()
     assert loop.is_closed()
@@ -301,7 +301,7 @@ from muros.rclc import Context, Executor
 from std_msgs.msg import Int32
 
 def work():
-    context = Context("local:")
+    context = Context(sys.argv[1])
     got = []
     node = context.node("node")
     node.subscription(Int32, "value", lambda message: got.append(message.data))
@@ -319,12 +319,13 @@ print(got)
 """
 
 END = """
+import sys
 from muros.rclc import Context, Executor
 from muros.space import open_space
 from std_msgs.msg import Int32
 
 space = open_space("local:")
-for context in (Context("local:"), Context(space)):
+for context in (Context(sys.argv[1]), Context(space)):
     context.on_state(print)
     node = context.node("node")
     node.publisher(Int32, "value", "sensor_data")
@@ -342,9 +343,9 @@ print("over")
     ],
     ids=["fork", "end"],
 )
-def test_programs_that_end_without_a_word(program: str, out: str, err: str) -> None:
+def test_programs_that_end_without_a_word(url: str, program: str, out: str, err: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-X", "dev", "-c", program], capture_output=True, text=True, timeout=30
+        [sys.executable, "-X", "dev", "-c", program, url], capture_output=True, text=True, timeout=30
     )
     assert (done.returncode, done.stdout) == (0, out)
     lines = done.stderr.splitlines()

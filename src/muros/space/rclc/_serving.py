@@ -180,10 +180,17 @@ class _Selector(selectors.DefaultSelector):
         owner.asleep = True
         owner.lock.release()
         try:
-            return super().select(left if timeout is None else min(left, timeout))
+            ready = super().select(left if timeout is None else min(left, timeout))
         finally:
             owner.lock.acquire()
             owner.asleep = False
+        return [event for event in map(self._now, ready) if event is not None]
+
+    def _now(self, event: tuple[selectors.SelectorKey, int]) -> tuple[selectors.SelectorKey, int] | None:
+        """An event as it is now that we have the lock again: others may have closed the socket meanwhile."""
+        key, mask = event
+        now = self.get_map().get(key.fd)
+        return (now, mask & now.events) if now is not None and now.fileobj is key.fileobj else None
 
 
 def _nothing() -> None:
