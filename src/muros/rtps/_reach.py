@@ -1,7 +1,7 @@
 """Where to send to a peer: of the addresses it gives, the one that surely works.
 
 A peer with several interfaces gives all their addresses, but each sample shall reach it once. The address from which
-its announcement came is known to work. On one host the loopback is quickest and never down, if both listen there.
+its announcement came is known to work. On one host the loopback is quickest and never down, if the peer listens there.
 Whether it is one host is told by that address, too, and not by those that are given: machines have addresses of
 bridges and containers in common.
 """
@@ -36,29 +36,27 @@ def is_multicast(locator: Locator) -> bool:
 class Hosts:
     """The addresses of this process, as needed to choose among those of peers."""
 
-    __slots__ = ("_loopback", "_ours")
+    __slots__ = ("_kinds", "_ours")
 
     def __init__(self, addresses: Addresses) -> None:
-        ours = {(at.kind, at.address) for at in (*addresses.metatraffic_unicast, *addresses.default_unicast)}
-        self._ours = frozenset(ours)
-        self._loopback = frozenset(kind for kind, address in ours if is_loopback(Locator(kind, 0, address)))
+        self._ours = frozenset(
+            (at.kind, at.address) for at in (*addresses.metatraffic_unicast, *addresses.default_unicast)
+        )
+        self._kinds = frozenset({UDP4, *(kind for kind, _ in self._ours)})
 
     def choose(self, offered: Iterable[Locator], source: Locator | None) -> tuple[Locator, ...]:
-        """The one of `offered` to send to, nothing when none can be reached. `source`: where the peer spoke from."""
-        kinds = {kind for kind, _ in self._ours}
-        usable = [
-            at
-            for at in offered
-            if at.kind in kinds and 0 < at.port < 65536 and any(at.address) and not is_multicast(at)
-        ]
+        """The one of `offered` to send to, nothing when none can be reached. `source`: where the peer spoke from.
+
+        The loopback is taken only from peers on this host, and there even when this process does not announce it.
+        """
         here = source is None or is_loopback(source) or (source.kind, source.address) in self._ours
-        if here:
-            near = [at for at in usable if is_loopback(at) and at.kind in self._loopback]
-            if near:
-                return (near[0],)
-        usable = [
-            at for at in usable if not is_loopback(at) and (here or (at.kind, at.address) not in self._ours)
-        ]
+        usable = []
+        for at in offered:
+            if at.kind in self._kinds and 0 < at.port < 65536 and any(at.address) and not is_multicast(at):
+                if here and is_loopback(at):
+                    return (at,)
+                if here or not (is_loopback(at) or (at.kind, at.address) in self._ours):
+                    usable.append(at)
         if not usable:
             return ()
         return (max(usable, key=lambda at: self._nearness(at, source)),)

@@ -103,12 +103,15 @@ class ReaderCore:
     def match_writer(self, writer: Guid, places: Iterable[Place], now: int, *, reliable: bool) -> None:
         """Samples of this writer are wanted from now on (8.4.10.1); what is said to it goes to each of `places`.
 
-        For a writer that is matched already only they are changed.
+        For a writer that is matched already only they are changed; it is then asked anew what it has.
         """
         key = split_guid(writer)
         proxy = self._proxies.get(key)
         if proxy is not None:
-            proxy.places = tuple(places)
+            before, proxy.places = proxy.places, tuple(places)
+            if proxy.reliable and proxy.places != before:
+                proxy.hellos = 0
+                self._hello(proxy, now)
             return
         proxy = self._proxies[key] = WriterProxy(*key, tuple(places), self.reliable and reliable)
         if proxy.reliable:

@@ -169,13 +169,16 @@ class WriterCore:
     ) -> None:
         """A reader wants the samples from now on (8.4.9.1.1); `transient_local`: those kept, too.
 
-        Everything for it goes to each of `places`. For a reader that is matched already only they are changed.
+        Everything for it goes to each of `places`. For a reader that is matched already only they are changed; it is
+        then told anew what there is.
         """
         key = split_guid(reader)
         proxy = self._proxies.get(key)
         if proxy is not None:
-            proxy.places = tuple(places)
+            before, proxy.places = proxy.places, tuple(places)
             self._reroute()
+            if proxy.reliable and proxy.places != before:
+                self._send_heartbeat(proxy, final=False)
             return
         start = self.sent + 1
         if self._retains and reliable and transient_local:
