@@ -130,7 +130,8 @@ def test_of_two_that_wait_one_serves_and_hands_over(url: str) -> None:
         context.close()
 
 
-def test_publishing_from_many_threads(url: str) -> None:
+def test_publishing_from_many_threads(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONASYNCIODEBUG", "1")  # which has loops look for calls of other threads
     talkers = [Context(url) for _ in range(3)]
     listener = Context(url)
     got: list[int] = []

@@ -135,6 +135,7 @@ class _Loop(asyncio.SelectorEventLoop):
     def __init__(self, owner: Server) -> None:
         self._owner = owner
         super().__init__(_Selector(owner, self))
+        self.set_debug(False)  # its check of threads knows nothing of the lock
 
     def end(self) -> None:
         """End the run that goes on."""
