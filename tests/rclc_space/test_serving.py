@@ -105,7 +105,8 @@ def test_what_comes_from_another_thread_wakes_who_waits(url: str) -> None:
     there.close()
 
 
-def test_of_two_that_wait_one_serves_and_hands_over(url: str) -> None:
+def test_of_two_that_wait_one_serves_and_hands_over(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONASYNCIODEBUG", "1")  # which has loops look for calls of other threads
     contexts = [Context(url) for _ in range(3)]
     got: list[list[int]] = [[], []]
     for i in range(2):
@@ -130,8 +131,7 @@ def test_of_two_that_wait_one_serves_and_hands_over(url: str) -> None:
         context.close()
 
 
-def test_publishing_from_many_threads(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONASYNCIODEBUG", "1")  # which has loops look for calls of other threads
+def test_publishing_from_many_threads(url: str) -> None:
     talkers = [Context(url) for _ in range(3)]
     listener = Context(url)
     got: list[int] = []
