@@ -108,6 +108,8 @@ class Peer:
         self.process = process
         self._log = log
         self._unread = b""
+        self.unanswered = 0
+        """Commands begun whose answer was not fetched."""
 
     @property
     def printed(self) -> str:
@@ -131,6 +133,7 @@ class Peer:
         try:
             self.process.stdin.write(json.dumps({"do": command, **arguments}).encode() + b"\n")
             self.process.stdin.flush()
+            self.unanswered += 1
         except BrokenPipeError:
             raise self._error("has ended") from None
 
@@ -158,6 +161,7 @@ class Peer:
         if not self.ready(wait):
             raise self._error(f"did not answer within {wait:.0f} s")
         line, _, self._unread = self._unread.partition(b"\n")
+        self.unanswered -= 1
         answer = json.loads(line)
         if "error" in answer:
             raise PeerError(f"{self.name}: {answer['error']}")

@@ -131,7 +131,7 @@ class Asker:
             service.name: (service, requester(service)) for service in (SEND_GOAL, CANCEL, RESULT)
         }
         self.feedback = node.reader(FEEDBACK, Qos(depth=50))
-        self.status = node.reader(STATUS, LATCHED)
+        self.status = node.reader(STATUS, LATCHED.replace(depth=50))
 
     def ask(self, service: Service, body: bytes) -> int:
         """Send a request; its number among all replies."""

@@ -53,12 +53,12 @@ def test_ros_sees_our_nodes_and_what_they_have(distro: str, peer: Fetch, rig: Ri
     assert of_other["services"] == {"/sum": ["test_msgs/srv/BasicTypes"]}
 
     writer.close()
-    rig.until(lambda: not rig.ask(ros, "endpoints", node=node, topic="/chatter")["publishers"])
+    assert rig.ask(ros, "without_publishers", node=node, topic="/chatter") == []
     talker.close()
     assert "/a/b/talker" not in rig.ask(ros, "nodes_without", node=node, names=["/a/b/talker"])
     space.close()
     assert rig.ask(ros, "nodes_without", node=node, names=["/other"]) == ["/onlooker"]
-    rig.until(lambda: "/nameless" not in rig.ask(ros, "topics", node=node), "topics without anybody to go")
+    assert rig.ask(ros, "without_publishers", node=node, topic="/nameless") == []
 
 
 @pytest.mark.parametrize("distro", ROS)

@@ -81,7 +81,10 @@ def test_we_ask_they_answer(name: str, peer: Fetch, rig: Rig, domain: Domain) ->
         other.begin("serve", service=service, count=101)
     rig.until(lambda: answers == {first: 42}, "the reply to the request that waited")
     assert requester.servers == 1
-    numbers = [requester.send(basic(1000, n)) for n in range(100)]
+    numbers = []
+    for n in range(100):
+        rig.until(lambda: len(answers) > n - 5, "replies")  # noqa: B023
+        numbers.append(requester.send(basic(1000, n)))
     rig.until(lambda: len(answers) == 101, "100 replies")
     assert [answers[number] for number in numbers] == [1000 + n for n in range(100)]
     if name == "cyclone":
@@ -190,4 +193,4 @@ def test_ros_reads_the_parameters_of_a_node_of_ours(
     )
     (reply,) = rig.ask(ros, "call", client=client, request={"names": ["speed"]})
     assert reply["values"][0]["integer_value"] == 5
-    assert wanted == [struct.pack("<I", 1) + string("speed")]
+    assert [data[:14] for data in wanted] == [struct.pack("<I", 1) + string("speed")]

@@ -246,26 +246,31 @@ class Cyclone:
         return self._keep(Caller(self.things[node], name, type, False))
 
     def call(
-        self, client: int, request: dict[str, Any], count: int = 1, wait: float = 10.0, number: str = ""
+        self,
+        client: int,
+        request: dict[str, Any],
+        count: int = 1,
+        wait: float = 10.0,
+        number: str = "",
+        window: int = 5,
     ) -> list[Any]:
         thing = self.things[client]
         wait_for(lambda: thing.matched() > 0, wait)
-        asked = []
-        for n in range(count):
-            asked.append(next(thing.sequence))
-            header = thing.id + struct.pack("<q", asked[-1])
-            body = encode(thing.type, request | ({number: n} if number else {}))
-            thing.writer.write(thing.kind(LE + header + body))
+        asked: list[int] = []
         answers: dict[int, Any] = {}
 
-        def enough() -> bool:
+        def proceed() -> bool:
             for sample in thing.reader.take(1000):
                 raw = getattr(sample, "raw", b"")
                 if raw[4:12] == thing.id:
                     answers[struct.unpack_from("<q", raw, 12)[0]] = decode(thing.type, raw[20:])
+            while len(asked) < count and len(asked) < len(answers) + window:
+                body = encode(thing.type, request | ({number: len(asked)} if number else {}))
+                asked.append(next(thing.sequence))
+                thing.writer.write(thing.kind(LE + thing.id + struct.pack("<q", asked[-1]) + body))
             return len(answers) >= count
 
-        wait_for(enough, wait)
+        wait_for(proceed, wait)
         return [answers.get(number) for number in asked]
 
     def endpoints(

@@ -76,7 +76,13 @@ class Ros:
         """Take a publisher, subscription, client or server out."""
         entity = self.things.pop(thing)
         inner = getattr(entity, "inner", entity)
-        (inner.destroy if hasattr(inner, "destroy") else entity.close)()
+        kind = next(
+            kind
+            for kind in ("publisher", "subscription", "client", "service")
+            if kind in type(inner).__name__.lower()
+        )
+        for _, node in self.contexts:
+            getattr(node, f"destroy_{kind}")(inner)
 
     # Topics
 
@@ -175,16 +181,24 @@ class Ros:
         return self._keep(thing)
 
     def call(
-        self, client: int, request: dict[str, Any], count: int = 1, wait: float = 10.0, number: str = ""
+        self,
+        client: int,
+        request: dict[str, Any],
+        count: int = 1,
+        wait: float = 10.0,
+        number: str = "",
+        window: int = 5,
     ) -> list[Any]:
-        """Wait for the server and call it `count` times at once; None for what was not answered in time."""
+        """Wait for the server and call it `count` times, `window` at once; None for what is not answered in time."""
         thing = self.things[client]
         end = time.monotonic() + wait
         if not thing.wait_for_service(wait):
             raise TimeoutError(f"no server of {thing.srv_name} within {wait} s")
         made = make(thing.kind.Request, request)
-        futures = []
+        futures: list[Any] = []
         for n in range(count):
+            if n >= window:
+                self._result(futures[n - window], end)
             if number:
                 setattr(made, number, n)
             futures.append(thing.call_async(made))
@@ -335,6 +349,12 @@ class Ros:
             ]
             for side, infos in zip(("publishers", "subscriptions"), found, strict=True)
         }
+
+    def without_publishers(self, node: int, topic: str, wait: float = 10.0) -> list[str]:
+        """The nodes that publish a topic: waits until there is none."""
+        thing = self.things[node]
+        self._wait(lambda: not thing.get_publishers_info_by_topic(topic), wait)
+        return [info.node_name for info in thing.get_publishers_info_by_topic(topic)]
 
     # Everything else
 
