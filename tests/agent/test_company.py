@@ -121,7 +121,7 @@ def test_the_key_of_a_wanderer_does_not_push_out_who_lives_at_an_address() -> No
 
 
 def test_a_watcher_that_raises_harms_no_client() -> None:
-    agent = Agent()
+    agent = Agent("local:")
 
     def watcher(event: Event) -> None:
         raise RuntimeError("no")
@@ -136,7 +136,7 @@ def test_a_watcher_that_raises_harms_no_client() -> None:
 
 def test_an_agent_whose_port_was_busy_can_be_started_again() -> None:
     async def program() -> None:
-        busy, agent = Agent(), Agent()
+        busy, agent = Agent("local:"), Agent("local:")
         taken = UdpLink(0, "127.0.0.1")
         busy.add_link(taken)
         await busy.start()

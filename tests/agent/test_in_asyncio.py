@@ -15,7 +15,7 @@ STATUS_AGENT = bytes.fromhex("8100000004010b000000585243450100010f00")
 
 def test_a_client_connects_and_the_agent_tells() -> None:
     async def program() -> list[Event]:
-        agent = Agent()
+        agent = Agent("local:")
         link = UdpLink(0, "127.0.0.1")
         agent.add_link(link)
         events: list[Event] = []
@@ -41,7 +41,7 @@ def test_a_client_connects_and_the_agent_tells() -> None:
 
 def test_repeats_of_a_finding_are_summarised_by_themselves() -> None:
     async def program() -> list[Finding]:
-        agent = Agent(findings=Findings(summary_period=0.02))
+        agent = Agent("local:", findings=Findings(summary_period=0.02))
         link = UdpLink(0, "127.0.0.1")
         agent.add_link(link)
         told: list[Finding] = []
@@ -71,7 +71,7 @@ def test_repeats_of_a_finding_are_summarised_by_themselves() -> None:
 
 def test_a_link_added_while_running_opens_at_once_and_a_busy_port_says_so() -> None:
     async def program() -> None:
-        agent = Agent()
+        agent = Agent("local:")
         await agent.start()
         link = UdpLink(0, "127.0.0.1")
         agent.add_link(link)
@@ -88,7 +88,7 @@ def test_a_link_added_while_running_opens_at_once_and_a_busy_port_says_so() -> N
 
 def test_run_ends_when_the_agent_is_closed() -> None:
     async def program() -> None:
-        agent = Agent()
+        agent = Agent("local:")
         agent.add_link(UdpLink(0, "127.0.0.1"))
         running = asyncio.create_task(agent.run())
         await asyncio.sleep(0)

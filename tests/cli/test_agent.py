@@ -46,7 +46,7 @@ class Running:
 
 @contextmanager
 def running(line: str) -> Iterator[Running]:
-    command = [sys.executable, "-m", "muros", "agent", *shlex.split(line)]
+    command = [sys.executable, "-m", "muros", "agent", "-m", "local", *shlex.split(line)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     try:
         assert process.stdout is not None
@@ -113,7 +113,10 @@ def test_a_pseudoterminal_names_its_far_end(tmp_path: Path) -> None:
     [
         ("udp4", "muros: udp4: -p PORT is required"),
         ("udp4 -p 99999", "muros: udp4: -p 99999: out of range: it must be from 0 to 65535"),
-        ("udp4 -p 1 -m dds", "muros: -m dds: not built yet in this version: use -m ced"),
+        (
+            "udp4 -p 1 -m ced --ros-distro humble",
+            "muros: --ros-distro humble has no meaning for -m ced: it belongs to dds",
+        ),
         ("udp4 -p 1 -r /nowhere.refs", "muros: /nowhere.refs: no such file or directory"),
     ],
 )
@@ -153,7 +156,8 @@ def test_a_port_in_use_is_one_line_and_status_1() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
-        command = [sys.executable, "-m", "muros", "agent", "udp4", "-p", str(port), "--bind", "127.0.0.1"]
+        command = [sys.executable, "-m", "muros", "agent", "-m", "ced", "udp4", "-p", str(port)]
+        command += ["--bind", "127.0.0.1"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=30, check=False)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("muros: udp4 ")

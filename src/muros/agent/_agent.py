@@ -1,6 +1,6 @@
 """The agent in an asyncio program: its core, its links and one timer.
 
-agent = Agent("local:")
+agent = Agent("dds:")
 agent.add_link(UdpLink(8888))
 agent.on_event(lambda event: print(event.text()))
 agent.on_finding(lambda finding: print(finding.format()))
@@ -30,18 +30,18 @@ _NS_PER_MS = 1_000_000
 class Agent:
     """A DDS-XRCE agent. Everything it does happens on the thread of the loop that runs it.
 
-    ``space``: a URL (``"local:"``) or a space to share with others. ``references`` gives a meaning to what clients
-    create by reference; the default is the convention of names. ``domain`` is meant by clients that ask for domain
-    255. ``limits`` are those of the agent; single ``fields`` of `Limits` may be given by name instead.
+    ``space``: a URL (``"dds:"``, the ROS 2 graph; ``"local:"``, only this process) or a space to share with others.
+    ``references`` gives a meaning to what clients create by reference; the default is the convention of names.
+    ``domain`` is meant by clients that ask for domain 255; None: that of the space. ``limits`` are those of the agent; single ``fields`` of `Limits` may be given by name instead.
     """
 
     def __init__(
         self,
-        space: str | Space = "local:",
+        space: str | Space = "dds:",
         *,
         references: References | None = None,
         findings: Findings | None = None,
-        domain: int = 0,
+        domain: int | None = None,
         limits: Limits | None = None,
         **fields: Any,
     ) -> None:
@@ -59,7 +59,7 @@ class Agent:
             self.findings,
             limits=replace(limits or Limits(), **fields),
             wall=time.time_ns,
-            default_domain=domain,
+            default_domain=self.space.domain if domain is None else domain,
         )
         self.core.on_event = self._tell
         self.core.on_wake = self._arm

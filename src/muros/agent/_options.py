@@ -19,18 +19,23 @@ VERBOSE: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class Middleware:
-    """A word of `-m`: the URL of its space (empty: not in this version) and what it is."""
+    """A word of `-m`: the URL of its space and what it is."""
 
     space: str
     about: str
 
 
 MIDDLEWARES: Final = {
-    "local": Middleware("local:", "the data space inside this agent"),
+    "dds": Middleware("dds:", "the ROS 2 graph"),
+    "rtps": Middleware("dds:", "the same, by its older name"),
+    "cyclonedds": Middleware("cyclonedds:", "the ROS 2 graph through Cyclone DDS, if that is installed"),
+    "local": Middleware("local:", "the data space inside this agent, and no network"),
     "ced": Middleware("local:", "the same, by the reference agent's name"),
-    "dds": Middleware("", "the ROS 2 graph"),
-    "rtps": Middleware("", "the same, by its older name"),
 }
+MIDDLEWARE: Final = "dds"
+"""Where the data goes unless told otherwise."""
+ROS_DISTROS: Final = ("humble", "iron", "jazzy", "kilted", "lyrical", "rolling")
+"""What `--ros-distro` takes: Humble writes longer gids into the graph than those after it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,9 +192,16 @@ OPTIONS: Final = (
     Option(
         "middleware",
         ("-m", "--middleware"),
-        "where the data goes: local or ced (default local)",
+        f"where the data goes: {', '.join(MIDDLEWARES)} (default {MIDDLEWARE})",
         "NAME",
         _one_of(tuple(MIDDLEWARES), "middleware"),
+    ),
+    Option(
+        "ros-distro",
+        ("--ros-distro",),
+        "the ROS 2 around us, where it cannot be seen",
+        "NAME",
+        _one_of(ROS_DISTROS, "ROS 2 distribution"),
     ),
     Option("refs", ("-r", "--refs"), "profiles for clients that create by reference", "FILE", Path),
     Option("refs-optional", ("--refs-optional",), "go on without profiles if FILE cannot be used"),

@@ -23,6 +23,7 @@ from muros.agent._options import (
     BY_KEY,
     DISCOVERY_PORT,
     IP_TRANSPORTS,
+    MIDDLEWARE,
     MIDDLEWARES,
     NO_EFFECT,
     OPTIONS,
@@ -72,7 +73,9 @@ class AgentOptions:
     """Everything the agent was told."""
 
     links: tuple[LinkOptions, ...]
-    middleware: str = "local"
+    middleware: str = MIDDLEWARE
+    ros_distro: str | None = None
+    """The ROS 2 distribution around us; None: seen from what comes."""
     refs: Path | None = None
     refs_optional: bool = False
     """Go on without profiles when the profiles file cannot be used."""
@@ -84,7 +87,7 @@ class AgentOptions:
     limits: Limits = DEFAULT_LIMITS
     """The limits of the agent, with what was said about them."""
     domain_override: int | None = None
-    """The domain of clients that ask for domain 255; None: 255 is a domain like others."""
+    """The domain of clients that ask for domain 255; None: that of the space."""
     notes: tuple[str, ...] = ()
     """What was understood but does nothing in this version, one line each."""
 
@@ -146,6 +149,9 @@ def help_text() -> str:
                 lines.append(f"  {', '.join(option.flags) + ' ' + option.value:<30}{option.about}".rstrip())
         lines.append("")
     lines.append(f"environment: {DOMAIN_OVERRIDE}=N takes clients that ask for domain 255 into domain N.")
+    lines.append(
+        "With -m dds those of ROS 2 hold: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS."
+    )
     return "\n".join(lines)
 
 
@@ -253,12 +259,14 @@ def _options(given: _Given, environ: Mapping[str, str]) -> AgentOptions:
     if not given.links:
         raise UsageError(f"no transport: say {', '.join(TRANSPORTS)}; for example: muros agent udp4 -p 8888")
     agent: dict[str, Any] = dict(given.agent)
-    middleware = agent.get("middleware", "local")
-    if not MIDDLEWARES[middleware].space:
-        raise UsageError(f"-m {middleware}: not built yet in this version: use -m ced")
+    middleware = agent.get("middleware", MIDDLEWARE)
+    distro = agent.get("ros-distro")
+    if distro is not None and not MIDDLEWARES[middleware].space.startswith("dds"):
+        raise UsageError(f"--ros-distro {distro} has no meaning for -m {middleware}: it belongs to dds")
     return AgentOptions(
         links=tuple(map(_link, given.links)),
         middleware=middleware,
+        ros_distro=distro,
         refs=agent.get("refs"),
         refs_optional=agent.get("refs-optional", False),
         verbose=agent.get("verbose", VERBOSE),

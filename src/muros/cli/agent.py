@@ -11,7 +11,7 @@ from muros.agent.arguments import AgentOptions, LinkOptions, UsageError, help_te
 from muros.agent.profiles import NamedReferences, Profiles, ProfilesError, ReferenceChain
 from muros.cli._log import DEBUG, STYLES, Log, Message
 from muros.cli._tap import Tap
-from muros.findings import Finding
+from muros.findings import Finding, Findings
 from muros.links import (
     LINK_KINDS,
     Address,
@@ -22,6 +22,7 @@ from muros.links import (
     PseudoterminalLink,
     SerialLink,
 )
+from muros.space import Space, SpaceError, open_space
 
 FAILED = 1
 WRONG_USE = 2
@@ -41,7 +42,7 @@ def run(argv: Sequence[str]) -> int:
         _say(f"note: {note}")
     try:
         asyncio.run(_serve(options, profiles))
-    except LinkError as error:
+    except (LinkError, SpaceError) as error:
         return _fail(error, FAILED)
     return 0
 
@@ -75,10 +76,11 @@ def _make_link(options: LinkOptions) -> Link:
 
 async def _serve(options: AgentOptions, profiles: Profiles) -> None:
     log = Log(sys.stdout, STYLES[options.log_style](), verbose=options.verbose, color=options.color)
+    space = _open_space(options)
     agent = Agent(
-        options.space,
+        space,
         references=ReferenceChain(profiles, NamedReferences()),
-        domain=options.domain_override or 0,
+        domain=options.domain_override,
         limits=options.limits,
     )
 
@@ -101,7 +103,7 @@ async def _serve(options: AgentOptions, profiles: Profiles) -> None:
     await agent.start()
     try:
         # The banner comes first: only open links know their ports.
-        log.started(_banner(options, links), [link.name for link in links])
+        log.started(_banner(space, links), [link.name for link in links])
         for end in unwatch:
             end()
         for each in early:
@@ -114,11 +116,19 @@ async def _serve(options: AgentOptions, profiles: Profiles) -> None:
         await stop.wait()
     finally:
         agent.close()
+        space.close()
 
 
-def _banner(options: AgentOptions, links: Sequence[Link]) -> str:
-    space = options.space.removesuffix(":")
-    return " · ".join([f"muros agent {__version__}", f"{space} space", *(link.name for link in links)])
+def _open_space(options: AgentOptions) -> Space:
+    given = {} if options.ros_distro is None else {"ros_distro": options.ros_distro}
+    return open_space(options.space, findings=Findings(), **given)
+
+
+def _banner(space: Space, links: Sequence[Link]) -> str:
+    engine = space.url.partition(":")[0]
+    where = {"dds": f"domain {space.domain}", "cyclonedds": f"domain {space.domain} (Cyclone DDS)"}
+    said = where.get(engine, f"{engine} space")
+    return " · ".join([f"muros agent {__version__}", said, *(link.name for link in links)])
 
 
 def _in_banner(event: LinkUp) -> bool:
