@@ -60,6 +60,7 @@ class Bench:
         references: References | None = None,
         *,
         locator: Locator | None = None,
+        url: str = "local:",
         resource_limit: int = 5000,
         **limits: Any,
     ) -> None:
@@ -67,7 +68,7 @@ class Bench:
         self.events: list[Event] = []
         self.findings = Findings()
         self.space = open_space(
-            "local:",
+            url,
             findings=self.findings,
             clock=lambda: WALL + self.now * 1_000_000,
             resource_limit=resource_limit,

@@ -7,8 +7,9 @@ import pytest
 from muros.agent import Agent, ClientBack, ClientSilent, Event
 from muros.links import LinkError, UdpLink
 from muros.space import Qos, Service, Topic
+from muros.xrce import create
 from muros.xrce.constants import DATA, FRAGMENT, KIND_REQUESTER, STREAM_RELIABLE
-from tests.agent.raw import BEST_EFFORT, KEEP_ALL, REQUESTER, Raw, submessage
+from tests.agent.raw import BEST_EFFORT, KEEP_ALL, PARTICIPANT, REQUESTER, Raw, submessage
 from tests.agent.replay import Bench
 
 ADD = Service("/add", "rq/addRequest", "rr/addReply", "Q", "P")
@@ -161,3 +162,23 @@ def test_an_attempt_whose_session_was_removed_may_connect_again() -> None:
     assert first.connect(("muros_id", "00000001")) == 0
     assert Raw(bench, "place", 2).connect() == 0
     assert first.connect(("muros_id", "00000001")) == 0
+
+
+def test_a_board_in_another_domain_than_the_computer_is_told() -> None:
+    """The commonest reason why nothing arrives: the domain is in the board's firmware."""
+    bench = Bench(url="local:42")
+    Raw(bench).tree()
+    (finding,) = bench.findings.snapshot()
+    assert (finding.code, finding.subject) == ("other-domain", "0")
+    assert "in domain 0, this computer in domain 42" in finding.format()
+    assert "ROS_DOMAIN_ID=0" in finding.format()
+
+
+def test_a_board_that_leaves_the_domain_to_the_agent_gets_the_computers() -> None:
+    """Domain 255 asks for none."""
+    bench = Bench(url="local:42")
+    client = Raw(bench)
+    assert client.connect() == 0
+    assert client.make(PARTICIPANT, create.participant("node", 255)) == 0
+    assert [each.domain for each in bench.space.graph.participants] == [42]
+    assert bench.findings.snapshot() == ()

@@ -59,7 +59,7 @@ class Agent:
             self.findings,
             limits=replace(limits or Limits(), **fields),
             wall=time.time_ns,
-            default_domain=self.space.domain if domain is None else domain,
+            default_domain=domain,
         )
         self.core.on_event = self._tell
         self.core.on_wake = self._arm

@@ -142,13 +142,13 @@ class AgentCore:
         *,
         limits: Limits,
         wall: Callable[[], int],
-        default_domain: int = 0,
+        default_domain: int | None = None,
     ) -> None:
         self.space = space
         self.references = references
         self.findings = findings
         self.limits = limits
-        self.default_domain = default_domain
+        self.default_domain = space.domain if default_domain is None else default_domain
         self.now = 0
         self.on_event: Callable[[Event], object] | None = None
         self.on_wake: Callable[[int], object] | None = None

@@ -11,6 +11,7 @@ from muros.agent._calls import Call
 from muros.agent._create import Refused, build, resolve, same
 from muros.agent._messages import InvalidMessage, parse_read_data_untrusted, status
 from muros.agent._proxies import (
+    ParticipantProxy,
     Proxy,
     Reading,
     ReplierProxy,
@@ -387,7 +388,22 @@ class AgentSession(SessionCore):
             )
         )
         self.core.has_created(self)
+        if isinstance(proxy, ParticipantProxy):
+            self._look_at_domain(proxy)
         return STATUS_OK
+
+    def _look_at_domain(self, proxy: ParticipantProxy) -> None:
+        """A board's domain is in its firmware; with the computer in another one they never meet, and wonder."""
+        ours = self.core.space.domain
+        if ours and proxy.domain != ours:
+            self.core.report(
+                "other-domain",
+                who=self.who,
+                subject=str(proxy.domain),
+                what=f"{self.who} is in domain {proxy.domain}, this computer in domain {ours}",
+                why=f"the client asks for domain {proxy.domain}",
+                remedy=f"Set domain {ours} in the board's program, or ROS_DOMAIN_ID={proxy.domain} here.",
+            )
 
     def _delete(self, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
         if self._status_must_wait(stream_id):
