@@ -32,7 +32,8 @@ class Agent:
 
     ``space``: a URL (``"dds:"``, the ROS 2 graph; ``"local:"``, only this process) or a space to share with others.
     ``references`` gives a meaning to what clients create by reference; the default is the convention of names.
-    ``domain`` is meant by clients that ask for domain 255; None: that of the space. ``limits`` are those of the agent; single ``fields`` of `Limits` may be given by name instead.
+    ``domain`` is meant by clients that ask for domain 255; None: that of the space. ``limits`` are those of the agent;
+    single ``fields`` of `Limits` may be given by name instead.
     """
 
     def __init__(

@@ -120,8 +120,9 @@ async def _serve(options: AgentOptions, profiles: Profiles) -> None:
 
 
 def _open_space(options: AgentOptions) -> Space:
-    given = {} if options.ros_distro is None else {"ros_distro": options.ros_distro}
-    return open_space(options.space, findings=Findings(), **given)
+    if options.ros_distro is None:
+        return open_space(options.space, findings=Findings())
+    return open_space(options.space, findings=Findings(), ros_distro=options.ros_distro)
 
 
 def _banner(space: Space, links: Sequence[Link]) -> str:
