@@ -1,0 +1,254 @@
+"""What others may cost: peers that say too much, too often, or too large things."""
+
+import time
+from typing import Any
+
+import pytest
+
+from muros.rtps import (
+    DomainProblem,
+    DomainSettings,
+    EndpointData,
+    EndpointQos,
+    ParticipantCore,
+    ParticipantData,
+    udp4,
+)
+from muros.rtps._constants import (
+    ENTITYID_PARTICIPANT_MESSAGE_WRITER,
+    ENTITYID_SEDP_PUBLICATIONS_WRITER,
+    ENTITYID_SEDP_SUBSCRIPTIONS_WRITER,
+    ENTITYID_SPDP_READER,
+    ENTITYID_SPDP_WRITER,
+)
+from muros.rtps._discovery_data import Assertion, departure
+from muros.rtps._wire import data, heartbeat, message
+from tests.rtps.domains import MS, SECOND, TYPE, Process, World
+
+
+class Stranger:
+    """A participant made of bytes, that does what it likes."""
+
+    def __init__(self, process: Process, number: int = 1, **options: Any) -> None:
+        self.process = process
+        self.prefix = b"stranger" + number.to_bytes(4, "big")
+        self.at = udp4("10.9.9.9", 7410 + number)
+        self.told = ParticipantData(
+            prefix=self.prefix, metatraffic_unicast=(self.at,), default_unicast=(self.at,), **options
+        )
+        self.announced = 0
+        self.sequence = 0
+
+    def send(self, *submessages: bytes) -> None:
+        self.process.core.receive(message(self.prefix, *submessages), self.at, self.process.now)
+
+    def announce(self) -> None:
+        self.announced += 1
+        self.send(data(ENTITYID_SPDP_READER, ENTITYID_SPDP_WRITER, self.announced, self.told.payload()))
+
+    def tell(
+        self, number: int, *, entity_prefix: bytes = b"", user_data: bytes = b"", topic: str = "rt/a"
+    ) -> None:
+        """It has a writer."""
+        told = EndpointData(
+            guid=(entity_prefix or self.prefix) + (number << 8 | 3).to_bytes(4, "big"),
+            topic=topic,
+            type_name=TYPE,
+            qos=EndpointQos(),
+            user_data=user_data,
+        )
+        self.say(ENTITYID_SEDP_PUBLICATIONS_WRITER, told.payload())
+
+    def say(self, writer: int, payload: bytes, inline_qos: bytes = b"") -> None:
+        self.sequence += 1
+        self.send(data(0, writer, self.sequence, payload, inline_qos=inline_qos))
+
+
+def met(**settings: Any) -> tuple[World, Process, ParticipantCore, Stranger]:
+    world = World()
+    process = world.process(settings=DomainSettings(**settings))
+    participant = process.participant()
+    stranger = Stranger(process)
+    stranger.announce()
+    return world, process, participant, stranger
+
+
+def test_peers_are_limited() -> None:
+    _, process, participant, _ = met(peers=10)
+    for number in range(2, 100):
+        Stranger(process, number).announce()
+    assert len(participant.participants) == 10
+    assert process.core.counters["too-many-peers"] == 89
+    assert [report.problem for report in process.reports] == [DomainProblem.TOO_MANY_PEERS]
+    assert process.reports[0].number == 10
+
+
+def test_participants_of_this_process_do_not_count_as_peers() -> None:
+    _, process, participant, _ = met(peers=1)
+    process.participant()
+    assert len(participant.participants) == 2
+
+
+def test_endpoints_of_a_peer_are_limited() -> None:
+    _, process, participant, stranger = met(endpoints_per_peer=5)
+    for number in range(20):
+        stranger.tell(number)
+    assert len(participant.endpoints) == 5
+    assert [report.problem for report in process.reports] == [DomainProblem.TOO_MANY_ENDPOINTS]
+    stranger.say(ENTITYID_SEDP_PUBLICATIONS_WRITER, b"", departure(participant.endpoints[0].guid))
+    stranger.tell(99)
+    assert len(participant.endpoints) == 5
+    assert participant.endpoint(stranger.prefix + (99 << 8 | 3).to_bytes(4, "big")) is not None
+
+
+def test_what_a_peer_says_is_limited_in_size() -> None:
+    _, process, participant, stranger = met(memory_per_peer=10_000)
+    for number in range(20):
+        stranger.tell(number, user_data=bytes(3000))
+    assert len(participant.endpoints) == 3
+    assert [report.problem for report in process.reports] == [DomainProblem.DISCOVERY_TOO_LARGE]
+    for _ in range(20):
+        stranger.tell(0, user_data=bytes(10))  # what is said anew counts once
+        stranger.tell(0, user_data=bytes(20))
+    assert len(participant.endpoint(stranger.prefix + b"\0\0\0\3").user_data) == 20  # type: ignore[union-attr]
+
+
+def test_changes_are_limited_in_time_and_heard_later() -> None:
+    world, process, participant, stranger = met(changes_burst=10, changes_per_second=100)
+    for number in range(50):
+        stranger.tell(number)
+    assert len(participant.endpoints) == 10
+    assert [report.problem for report in process.reports] == [DomainProblem.FLOOD]
+    world.run(100 * MS)
+    assert 15 <= len(participant.endpoints) <= 30
+    world.run(SECOND)
+    assert len(participant.endpoints) == 50
+
+
+def test_nobody_speaks_of_anothers_endpoints() -> None:
+    _, process, participant, stranger = met()
+    stranger.tell(1, entity_prefix=b"another one.")
+    writer = EndpointData(guid=stranger.prefix + b"\0\0\1\3", topic="t", type_name=TYPE, qos=EndpointQos())
+    stranger.say(ENTITYID_SEDP_SUBSCRIPTIONS_WRITER, writer.payload())
+    assert process.core.counters["prefix-mismatch"] == 1
+    stranger.sequence = 0  # another writer, with numbers of its own
+    stranger.say(ENTITYID_SEDP_SUBSCRIPTIONS_WRITER, writer.payload())
+    assert process.core.counters["prefix-mismatch"] == 3
+    assert participant.endpoints == ()
+
+
+def test_malformed_discovery_is_counted_and_what_follows_is_heard() -> None:
+    _, process, participant, stranger = met()
+    stranger.say(ENTITYID_SEDP_PUBLICATIONS_WRITER, b"\0\3\0\0nonsense")
+    stranger.say(ENTITYID_SEDP_PUBLICATIONS_WRITER, b"")
+    stranger.tell(7)
+    stranger.sequence = 0
+    stranger.say(ENTITYID_PARTICIPANT_MESSAGE_WRITER, b"\0\1\0\0")
+    stranger.say(ENTITYID_PARTICIPANT_MESSAGE_WRITER, Assertion(b"another one.", False).payload())
+    assert len(participant.endpoints) == 1
+    assert process.core.counters["discovery-malformed"] == 3
+    stranger.sequence = 99
+    stranger.send(
+        data(ENTITYID_SPDP_READER, ENTITYID_SPDP_WRITER, 50, b"\0\3\0\0nonsense"),
+    )
+    assert process.core.counters["discovery-malformed"] == 4
+
+
+def test_samples_nobody_wants_are_counted() -> None:
+    _, process, participant, stranger = met()
+    process.reader(participant)
+    stranger.send(data(0, 0x103, 1, b"\0\1\0\0"), heartbeat(0, 0x103, 1, 1, 1))
+    assert process.core.counters["unmatched"] == 2
+
+
+def test_a_lease_that_is_too_short_is_lengthened() -> None:
+    world, process, participant, _ = met()
+    hasty = Stranger(process, 2, lease=1)
+    hasty.announce()
+    world.run(50 * MS)
+    assert len(participant.participants) == 2
+    world.run(100 * MS)
+    assert len(participant.participants) == 1
+
+
+def test_a_heartbeat_of_a_huge_range_asks_for_little() -> None:
+    world, _, _, stranger = met()
+    sent = world.record()
+    for count in range(1, 101):
+        stranger.send(heartbeat(0, ENTITYID_SEDP_PUBLICATIONS_WRITER, 1, 2**62, count))
+    world.run(SECOND)
+    assert len(sent) < 40
+    assert all(len(datagram.data) < 1000 for datagram in sent)
+
+
+def test_endless_talk_within_a_process_leaves_room_for_others() -> None:
+    world = World()
+    process = world.process(settings=DomainSettings(turn=100))
+    one, two = process.participant(), process.participant()
+    ping, pong = process.writer(one, "rt/ping"), process.writer(two, "rt/pong")
+    process.reader(one, "rt/pong", on_sample=lambda sample: ping.write(sample.payload, process.now) and None)
+    process.reader(two, "rt/ping", on_sample=lambda sample: pong.write(sample.payload, process.now) and None)
+    ping.write(b"\0\1\0\0ball", process.now)
+    first = ping.last
+    assert 10 < first < 200
+    assert process.core.deadline == process.now
+    process.core.tick(process.now)
+    assert first < ping.last < 400
+
+
+def test_the_queue_within_a_process_is_limited() -> None:
+    world = World()
+    process = world.process(settings=DomainSettings(queue=50))
+    one, two = process.participant(), process.participant()
+    writer = process.writer(one, qos=EndpointQos(depth=1000))
+    trigger = process.writer(one, "rt/go")
+
+    def flood(_: object) -> None:
+        for number in range(200):
+            writer.write(number.to_bytes(8, "big"), process.now)
+
+    process.reader(two, "rt/go", on_sample=flood)
+    reader = process.reader(two)
+    trigger.write(b"\0\1\0\0", process.now)
+    assert process.core.counters["dropped"] >= 150
+    assert DomainProblem.QUEUE_FULL in [report.problem for report in process.reports]
+    world.run(SECOND)
+    assert len(process.got[reader.guid]) == 200  # it is reliable
+
+
+@pytest.mark.parametrize("name", ["peers", "queue", "lease_least", "announce_period"])
+def test_settings_are_checked(name: str) -> None:
+    with pytest.raises(ValueError, match=name):
+        DomainSettings(**{name: 0})  # type: ignore[arg-type]
+
+
+def test_many_are_no_trouble() -> None:
+    """Forty participants with five hundred endpoints meet in a moment, and idle for nothing."""
+    world = World()
+    left, right = world.process(), world.process()
+    start = time.process_time()
+    for number in range(20):
+        talker, listener = left.participant(), right.participant()
+        for topic in range(12):
+            left.writer(talker, f"rt/{number}/{topic}")
+            right.reader(listener, f"rt/{number}/{topic}")
+    world.run(2 * SECOND)
+    for process in (left, right):
+        for participant in process.core.participants:
+            assert len(participant.endpoints) == 39 * 12
+            assert all(writer.matched for writer in participant.writers)
+            assert all(reader.matched for reader in participant.readers)
+    assert time.process_time() - start < 10
+    ticks = [0]
+    before = left.core.tick
+
+    def counted(now: int) -> int | None:
+        ticks[0] += 1
+        return before(now)
+
+    left.core.tick = counted  # type: ignore[method-assign]
+    world.run(10 * SECOND)
+    assert ticks[0] < 200
+    left.core.close(left.now)
+    world.run(SECOND)
+    assert all(len(participant.endpoints) == 19 * 12 for participant in right.core.participants)
