@@ -35,11 +35,11 @@ def require_namespaces() -> None:
         pytest.skip(why)
 
 
-def run(function: str) -> None:
+def run(function: str, *arguments: str) -> None:
     """Calls `module:function` in a new namespace, where only an idle loopback is; fails as it does."""
     require_namespaces()
     done = subprocess.run(
-        [*_UNSHARE, sys.executable, "-W", "error", "-m", "tests.rtps_net.namespaces", function],
+        [*_UNSHARE, sys.executable, "-W", "error", "-m", "tests.rtps_net.namespaces", function, *arguments],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -57,7 +57,7 @@ def ip(*words: str) -> None:
 def main() -> None:
     """Called in the namespace."""
     module, _, function = sys.argv[1].partition(":")
-    getattr(importlib.import_module(module), function)()
+    getattr(importlib.import_module(module), function)(*sys.argv[2:])
 
 
 if __name__ == "__main__":

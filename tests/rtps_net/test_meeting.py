@@ -70,7 +70,6 @@ def test_localhost_needs_no_multicast(settings: NetworkSettings, first: bool) ->
     asyncio.run(run())
 
 
-@pytest.mark.xfail(strict=True, raises=TimeoutError, reason="an only loopback address counts as out of reach")
 def test_subnet_and_localhost_meet_on_one_host(settings: NetworkSettings) -> None:
     async def run() -> None:
         with Process({"domain": settings.domain, "range": "LOCALHOST", "group": "239.255.0.9"}) as echo:

@@ -28,7 +28,7 @@ def cable() -> None:
 
 async def _meet(settings: NetworkSettings, other: dict[str, Any]) -> None:
     with Process(other, "unshare", "--net") as echo:
-        _connect(echo, "10.1.0")
+        connect(echo.pid, "10.1.0")
         async with Station(settings, "here") as here:
             assert echo.start() == 0
             assert here.network.index == 0
@@ -43,35 +43,35 @@ async def _cable() -> None:
         ip("link set lo up")
         async with Station(NetworkSettings(), "here") as here:
             echo_index = asyncio.to_thread(echo.start)
-            _wait_for_namespace(echo)
+            _wait_for_namespace(echo.pid)
             assert await echo_index == 0
-            _connect(echo, "10.1.0")
+            connect(echo.pid, "10.1.0")
             await exchange(here, [12] * 100)
             ip("link del v0")
             await until(lambda: [i.name for i in here.network.interfaces] == ["lo"])
-            _connect(echo, "10.2.0")
+            connect(echo.pid, "10.2.0")
             sent = [b"again..." + bytes([0, 0, 0, n]) for n in range(100)]
             for payload in sent:
                 assert here.write("rt/ping", payload)
             await until(lambda: here.got["rt/pong"][100:] == sent)
 
 
-def _wait_for_namespace(process: Process) -> None:
+def _wait_for_namespace(process: int) -> None:
     """Until it is in a namespace that is not ours."""
     mine = os.stat("/proc/self/ns/net").st_ino
     end = time.monotonic() + 10
-    while os.stat(f"/proc/{process.pid}/ns/net").st_ino == mine:
+    while os.stat(f"/proc/{process}/ns/net").st_ino == mine:
         assert time.monotonic() < end
         time.sleep(0.005)
 
 
-def _connect(process: Process, net: str) -> None:
+def connect(process: int, net: str) -> None:
     """A cable between this host (.1) and that of the process (.2)."""
     _wait_for_namespace(process)
-    inside = f"--net=/proc/{process.pid}/ns/net"
+    inside = f"--net=/proc/{process}/ns/net"
     ip("link set lo up")
     ip("link add v0 type veth peer name v1")
-    ip(f"link set v1 netns {process.pid}")
+    ip(f"link set v1 netns {process}")
     _ip_inside(inside, "link set lo up")
     _ip_inside(inside, f"addr add {net}.2/24 dev v1")
     _ip_inside(inside, "link set v1 up")
