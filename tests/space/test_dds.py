@@ -3,10 +3,10 @@
 import asyncio
 from collections.abc import Callable
 
-from muros.findings import Findings
+from muros.findings import Finding, Findings
 from muros.rtps import DomainCore, Locator
-from muros.space import Space, open_space
-from tests.space.conformance import VirtualTime
+from muros.space import Requester, Space, identity_of, open_space
+from tests.space.conformance import CHATTER, KEEP_ALL, VirtualTime, numbered, take_all
 
 
 class Nowhere:
@@ -30,7 +30,10 @@ class Nowhere:
 
 
 class TestDds(VirtualTime):
-    """The contract, among the participants of one process."""
+    """The contract, among the participants of one process. Tests of its name replaced here say what is different."""
+
+    ON_THE_WAY = VirtualTime.LIMIT
+    TYPE_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 
     def make(self) -> Space:
         clock = self.clock
@@ -46,3 +49,61 @@ class TestDds(VirtualTime):
             max_blocking_time=self.PATIENCE,
             request_wait=self.REQUEST_WAIT,
         )
+
+    def heard_identity(self, requester: Requester, number: int) -> bytes:
+        """Requests name the reader that waits for the reply, as ROS 2 wants it."""
+        return identity_of(requester.gid[:15] + b"\x04", number)
+
+    def test_patience_begins_anew_after_room(self, space: Space) -> None:
+        """Patience counts from the reader's last acknowledgement, whenever the writer is refused."""
+        writer = space.participant("talker").writer(CHATTER, KEEP_ALL)
+        reader = space.participant("listener").reader(CHATTER, KEEP_ALL)
+        self.settle(space)
+        while writer.write(b"x"):
+            self.settle(space)
+        for _ in range(3):
+            assert reader.take() is not None
+            self.settle(space)
+            assert writer.write(b"x")
+            assert not writer.write(b"x"), "full again"
+            self.pass_time(space, self.PATIENCE - 1)
+            assert not writer.write(b"x")
+        assert reader.lost == 0
+
+    def test_a_stuck_reader_holds_up_others_only_for_a_while(self, space: Space, told: list[Finding]) -> None:
+        """What is under way to the stuck reader waits for it: it loses less than in a space of one process."""
+        writer = space.participant("talker").writer(CHATTER, KEEP_ALL)
+        stuck = space.participant("stuck").reader(CHATTER, KEEP_ALL)
+        quick = space.participant("quick").reader(CHATTER, KEEP_ALL)
+        got: list[bytes] = []
+        sent = refused = 0
+
+        def send() -> None:
+            nonlocal sent, refused
+            if writer.write(numbered(sent)):
+                sent += 1
+            else:
+                refused += 1
+
+        writer.on_room = send
+        self.settle(space)
+        for _ in range(2 * self.LIMIT + 1):
+            send()
+            self.settle(space)
+            got += take_all(quick)
+        assert (sent, refused) == (2 * self.LIMIT, 1)
+        self.pass_time(space, self.PATIENCE - 1)
+        assert sent == 2 * self.LIMIT
+        self.pass_time(space, 1)
+        assert sent == 2 * self.LIMIT + 1, "the writer was called and got through"
+        for _ in range(3):
+            send()
+            self.settle(space)
+        assert refused == 1, "who is stuck holds up nobody a second time"
+        got += take_all(quick)
+        assert got == [numbered(i) for i in range(sent)]
+        assert [(f.code, f.who) for f in told] == [("reader-stalled", "/talker")]
+        assert self.take_everything(space, stuck) == [numbered(i) for i in range(sent)]
+        send()
+        self.settle(space)
+        assert take_all(stuck) == [numbered(sent - 1)], "when it goes on taking, it gets samples again"
