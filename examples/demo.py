@@ -1,7 +1,9 @@
-"""The main job in under a minute: boards and an agent play ping-pong, the agent is killed, the boards come back.
+"""The main job in under a minute: boards play ping-pong, the agent is killed, they come back, and ROS 2 sees it all.
 
 Four boards run `ping_pong.py`: two are MicroPython interpreters, two CPython; of each, one speaks UDP and one a serial
-line. Everything stays on this machine. The exit status is 0 when every board heard pongs and was back within 2 s.
+line. At the end an ordinary ROS 2 node listens (rclpy, where it is installed; else `muros topic echo`). Everything
+stays on this machine. The exit status is 0 when every board heard pongs and was back within 2 s, and the graph of ROS 2
+had their nodes and messages.
 """
 
 import argparse
@@ -22,7 +24,16 @@ HERE = Path(__file__).resolve().parent
 SOURCE = HERE.parent / "src"
 BACK_WITHIN = 2.0
 """Seconds that a board may take to be connected again once the agent is up."""
-_COLOURS = {"agent": "1", "mpy-udp": "32", "mpy-serial": "36", "py-udp": "33", "py-serial": "35"}
+LISTENS_FOR = 5.0
+"""Seconds that the listener in the ROS 2 graph takes."""
+_COLOURS = {
+    "agent": "1",
+    "ros2": "34",
+    "mpy-udp": "32",
+    "mpy-serial": "36",
+    "py-udp": "33",
+    "py-serial": "35",
+}
 
 
 @dataclass
@@ -63,6 +74,9 @@ class Stage:
         self.agent: subprocess.Popen[str] | None = None
         self.port = _free_port()
         self.lines = [folder / "ttyBoard0", folder / "ttyBoard1"]
+        # The graph of ROS 2, on this machine only; nobody else's settings of ROS 2 count.
+        self.environment = {k: v for k, v in os.environ.items() if not k.startswith(("ROS_", "RMW_"))}
+        self.environment.update(ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST", PYTHONUNBUFFERED="1")
         self._lock = threading.Lock()
         self._readers: list[threading.Thread] = []
 
@@ -90,7 +104,7 @@ class Stage:
             "127.0.0.1",
             *lines,
         ]
-        self.agent = self._spawn(command, dict(os.environ), "agent", None)
+        self.agent = self._spawn(command, self.environment, "agent", None)
 
     def kill_agent(self) -> None:
         """Kills it, as a power cut would."""
@@ -106,6 +120,15 @@ class Stage:
         self.boards.append(board)
         command = [*interpreter, str(HERE / "ping_pong.py"), name.replace("-", "_"), *words, "1.0"]
         board.process = self._spawn(command, environment, name, board)
+
+    def listen(self, command: list[str], seconds: float) -> int:
+        """Runs a listener in the ROS 2 graph to its end, at most ``seconds``; returns its exit status."""
+        process = self._spawn(command, self.environment, "ros2", None)
+        try:
+            return process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return process.wait()
 
     def close(self) -> None:
         """Stops every process."""
@@ -186,6 +209,7 @@ def play(stage: Stage, micropython: str | None, seconds: float) -> int:
     stage.start_agent()
     restarted = time.monotonic()
     time.sleep(seconds)
+    heard = _ros2(stage)
 
     stage.say("demo", "what happened")
     failed = False
@@ -203,8 +227,42 @@ def play(stage: Stage, micropython: str | None, seconds: float) -> int:
             )
             + ("" if fine else "  <- not as it should be"),
         )
-    stage.say("demo", "FAILED" if failed else f"every board came back by itself within {BACK_WITHIN:.0f} s")
+    stage.say(
+        "ros2", "saw the boards' nodes and messages" if heard else "saw nothing  <- not as it should be"
+    )
+    failed |= not heard
+    said = f"every board came back by itself within {BACK_WITHIN:.0f} s, and ROS 2 saw it"
+    stage.say("demo", "FAILED" if failed else said)
     return 1 if failed else 0
+
+
+def _ros2(stage: Stage) -> bool:
+    """The boards as ROS 2 sees them: by a node of rclpy where that is installed, else by our own commands."""
+    python = _rclpy()
+    if python is not None:
+        stage.say("demo", "an ordinary ROS 2 node (rclpy) joins: what does it see of the boards?")
+        return stage.listen([python, str(HERE / "ros2_listener.py"), str(LISTENS_FOR)], 30.0) == 0
+    stage.say(
+        "demo",
+        "no rclpy here; muros looks into the ROS 2 graph itself: muros node list, muros topic echo /ping",
+    )
+    muros = [sys.executable, "-m", "muros"]
+    saw = stage.listen([*muros, "node", "list"], 30.0) == 0
+    return (
+        stage.listen([*muros, "topic", "echo", "/ping", "std_msgs/msg/Header", "--once"], 30.0) == 0 and saw
+    )
+
+
+def _rclpy() -> str | None:
+    """A Python that has rclpy: of a ROS 2 that was sourced, or of the environments of the tests."""
+    peers = sorted((HERE.parent / "build/peers").glob("*/bin/python"))
+    for python in [sys.executable, shutil.which("python3"), *map(str, peers)]:
+        if (
+            python
+            and subprocess.run([python, "-c", "import rclpy, std_msgs"], capture_output=True).returncode == 0
+        ):
+            return python
+    return None
 
 
 def _micropython() -> str | None:
