@@ -23,6 +23,11 @@ def datagrams(name: str) -> tuple[bytes, ...]:
     )
 
 
+def domain_of(name: str) -> int:
+    """The domain id they were captured in."""
+    return int(json.loads((DIRECTORY / f"{name}.json").read_text())["domain"])
+
+
 @cache
 def messages(name: str) -> tuple[Message, ...]:
     """The same, parsed."""
