@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from muros.space import Durability, History, Qos, Reliability, Topic
+from muros.space import Durability, History, Qos, Reliability, Space, Topic
 from tests.dds.bodies import array, pattern, shown, string, text_of
 from tests.dds.domains import Domain
 from tests.dds.peers import PROGRAMS, Peer, start
@@ -240,38 +240,45 @@ def test_ros_crashes_and_comes_again(distro: str, rig: Rig, domain: Domain) -> N
 
 
 @pytest.mark.parametrize("distro", ROS)
-@pytest.mark.parametrize("end", ["leaves", "crashes"])
+@pytest.mark.parametrize("end", ["reconnects", "leaves", "crashes"])
 def test_we_come_again(distro: str, end: str, peer: Fetch, rig: Rig, domain: Domain) -> None:
-    """The same participant key in a second life: the same gids, and what is written arrives."""
+    """A board that reconnects has the gids it had, a process that starts anew has others; samples flow at once."""
     ros = peer(distro)
     node = ros.do("node", name="ros", domain=domain)
     text = {"node": node, "type": "std_msgs/msg/String"}
     subscription = ros.do("subscription", topic="/out", **text)
     publisher = ros.do("publisher", topic="/in", **text)
+    cut: set[int] = set()
     gids = set()
-    for life in ("first", "second"):
-        cut = False
 
-        def fault(datagram: bytes) -> bool:
-            return cut  # noqa: B023
+    def space(life: int) -> Space:
+        return rig.space(domain, fault=lambda _: life in cut)
 
-        space = rig.space(domain, fault=fault)
-        ours = space.participant("ours", key=b"board 7")
-        writer = ours.writer(Topic("rt/out", STRING), Qos(depth=5), key=1)
-        reader = ours.reader(Topic("rt/in", STRING), Qos(depth=5), key=1)
-        gids.add((ours.gid, writer.gid, reader.gid))
+    ours = space(0)
+    for life in range(3):
+        board = ours.participant("board", key=b"board 7")
+        writer = board.writer(Topic("rt/out", STRING), Qos(depth=5), key=1)
+        reader = board.reader(Topic("rt/in", STRING), Qos(depth=5), key=1)
+        gids.add((board.gid, writer.gid, reader.gid))
         rig.matched(writer)
         rig.matched(reader)
-        assert rig.ask(ros, "matched", thing=subscription) == 1
-        rig.run(0.3)
-        writer.write(string(life))
-        assert rig.ask(ros, "take", subscription=subscription) == [{"data": life}]
-        rig.ask(ros, "publish", publisher=publisher, message={"data": life})
-        assert [text_of(body) for body in rig.collect(reader, 1)] == [life]
-        cut = end == "crashes"
-        space.close()
+        present = 1 + (life if end == "crashes" else 0)  # the crashed are there until their lease is over
+        assert rig.ask(ros, "matched", thing=subscription, count=present) == present
+        assert rig.ask(ros, "matched", thing=publisher, count=present) == present
         rig.run(0.1)
-    assert len(gids) == 1
+        writer.write(string(f"life {life}"))
+        assert rig.ask(ros, "take", subscription=subscription) == [{"data": f"life {life}"}]
+        rig.ask(ros, "publish", publisher=publisher, message={"data": f"life {life}"})
+        assert [text_of(body) for body in rig.collect(reader, 1)] == [f"life {life}"]
+        if end == "reconnects":
+            board.close()
+            continue
+        if end == "crashes":
+            cut.add(life)
+        ours.close()
+        rig.run(0.1)
+        ours = space(life + 1)
+    assert len(gids) == (1 if end == "reconnects" else 3)
 
 
 def test_keep_all_waits_for_a_ros_that_stands_still(peer: Fetch, rig: Rig, domain: Domain) -> None:
