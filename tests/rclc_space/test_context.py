@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -11,10 +11,13 @@ from muros.rclc import Executor, RclError
 from muros.rclc.hosts import Context
 from muros.space import CDR_BE, Durability, History, Reliability, Space, Topic, open_space
 from muros.space import Qos as SpaceQos
-from muros.space.rclc import PROBLEMS
+from muros.space.rclc import PROBLEMS, SpaceMiddleware
 
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32, String
+
+if TYPE_CHECKING:
+    from muros.rclc._types import Middleware
 
 INT32 = "std_msgs::msg::dds_::Int32_"
 NAME: Any = "local:"
@@ -208,6 +211,33 @@ def test_what_the_space_reports_is_a_problem_of_whom_it_is_about(
     assert capsys.readouterr().err == f"muros: {said}\n".replace("/listener", "/other")
     talker.close()
     listener.close()
+
+
+def test_what_is_about_nobody_is_told_to_those_who_listen_and_printed_once(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    contexts = [Context("local:") for _ in range(4)]
+    problems: list[tuple[int, str]] = []
+    for context in contexts[:2]:
+        context.on_problem(lambda code, text: problems.append((code, text)))
+    middleware: SpaceMiddleware = contexts[0].middleware  # type: ignore[assignment]
+    protocol: Middleware = middleware  # for the type checker
+    space = middleware.ground.space
+    space.findings.report("dds-no-multicast", who="the network", what="it is deaf", remedy="Mend it", now=1.0)
+    space.findings.report("new-code", who="the network", what="it is mute", now=1.0)
+    for context in contexts:
+        Executor(context).spin_some()
+    said = [(42, "the network: it is deaf. Mend it."), (20, "the network: it is mute.")]
+    assert problems == said * 2
+    assert capsys.readouterr().err == "".join(f"muros: {text}\n" for _, text in said)
+    for context in contexts:
+        context.close()
+    assert protocol.state == 0
+
+
+def test_codes_are_told_apart() -> None:
+    assert len(set(PROBLEMS.values())) == len(PROBLEMS)
+    assert min(PROBLEMS.values()) > 20
 
 
 def test_a_problem_does_not_wait_for_the_end_of_a_pass(space: Space) -> None:

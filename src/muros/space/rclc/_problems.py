@@ -27,6 +27,18 @@ PROBLEMS: Final = {
     "durability-lowered": 33,
     "reader-deadline-missed": 34,
     "writer-deadline-missed": 35,
+    "samples-lost": 36,
+    "reader-stalled": 37,
+    "sample-unreadable": 38,
+    "mixed-distros": 39,
+    "discovery-info-unreadable": 40,
+    "dds-no-interface": 41,
+    "dds-no-multicast": 42,
+    "dds-interface-missing": 43,
+    "dds-peer-unknown": 44,
+    "dds-receive-buffer-small": 45,
+    "dds-receive-buffer-full": 46,
+    "dds-send-queue-full": 47,
 }
 """Codes of `Context.on_problem` by the code of the finding. Those below 20 are told of sessions and by rclc itself."""
 
