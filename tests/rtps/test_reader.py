@@ -237,6 +237,15 @@ class TestAsking:
         assert bench.sent == []
         assert bench.core.deadline is None
 
+    def test_a_writer_that_wants_a_hello_from_0_gets_one(self) -> None:
+        bench = Bench(matched=False)
+        bench.match(hello_base=0)
+        bench.wait(150 * MS)
+        assert [(ack.base, ack.missing, ack.final) for ack in bench.take(AckNack)] == [(0, (), False)] * 2
+        bench.beat(7, 7, final=False)
+        (ack,) = bench.take(AckNack)
+        assert (ack.base, ack.missing) == (7, (7,))
+
     def test_a_best_effort_writer_is_told_nothing(self) -> None:
         bench = Bench(matched=False)
         bench.match(reliable=False)

@@ -137,7 +137,9 @@ class Discovery(Timed):
                 self._domain.agenda.at(port, port.core.due)
             if has & announcer:
                 listener, remote = self._readers[writer], guid_of(peer.prefix, writer)
-                listener.core.match_writer(remote, peer.discovery, now, reliable=True)
+                listener.core.match_writer(
+                    remote, peer.discovery, now, reliable=True, hello_base=peer.hello_base
+                )
                 self._domain.add_route(remote, listener)
                 self._domain.agenda.at(listener, listener.core.due)
 

@@ -407,7 +407,13 @@ class ParticipantCore:
             owner.add_route(remote.guid, local)
             if peer is not None:
                 self._watch(local, remote, peer, now)
-            local.core.match_writer(remote.guid, places, now, reliable=remote.qos.reliable)
+            local.core.match_writer(
+                remote.guid,
+                places,
+                now,
+                reliable=remote.qos.reliable,
+                hello_base=1 if peer is None else peer.hello_base,
+            )
         owner.agenda.at(local, local.core.due)
 
     def _separate(self, local: LocalWriter | LocalReader, remote: EndpointData, now: int) -> None:

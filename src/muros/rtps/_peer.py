@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Final
 
 from muros.rtps._agenda import Timed
+from muros.rtps._constants import VENDOR_EPROSIMA
 from muros.rtps._discovery_data import EndpointData, ParticipantData
 from muros.rtps._endpoint import NEVER, SECOND
 from muros.rtps._reach import INSIDE, Hosts
@@ -64,6 +65,15 @@ class Peer(Timed):
     def prefix(self) -> GuidPrefix:
         """Its GUID prefix."""
         return self.data.prefix
+
+    @property
+    def hello_base(self) -> int:
+        """Where the numbers begin in an ACKNACK that asks a writer of it for nothing but a HEARTBEAT.
+
+        Fast DDS answers at once only when it is 0, and else with its next regular one, in up to three seconds. The
+        specification allows no 0 (8.3.5.5), and others drop the message.
+        """
+        return 0 if self.data.vendor == VENDOR_EPROSIMA else 1
 
     def locate(self, hosts: Hosts) -> None:
         """Choose anew where to send to it."""

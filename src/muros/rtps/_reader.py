@@ -100,10 +100,13 @@ class ReaderCore:
         """Bytes of memory taken by samples that are not delivered yet."""
         return sum(proxy.held for proxy in self._proxies.values())
 
-    def match_writer(self, writer: Guid, places: Iterable[Place], now: int, *, reliable: bool) -> None:
+    def match_writer(
+        self, writer: Guid, places: Iterable[Place], now: int, *, reliable: bool, hello_base: int = 1
+    ) -> None:
         """Samples of this writer are wanted from now on (8.4.10.1); what is said to it goes to each of `places`.
 
-        For a writer that is matched already only they are changed; it is then asked anew what it has.
+        hello_base: where the numbers begin in the ACKNACK that asks for nothing but a HEARTBEAT. For a writer that is
+        matched already only the places are changed; it is then asked anew what it has.
         """
         key = split_guid(writer)
         proxy = self._proxies.get(key)
@@ -114,6 +117,7 @@ class ReaderCore:
                 self._hello(proxy, now)
             return
         proxy = self._proxies[key] = WriterProxy(*key, tuple(places), self.reliable and reliable)
+        proxy.hello_base = hello_base
         if proxy.reliable:
             self._hello(proxy, now)
 
@@ -397,7 +401,8 @@ class ReaderCore:
         proxy.hello_at = now + (self.settings.hello_period << proxy.hellos)
         self._wake(proxy, proxy.hello_at)
         proxy.hellos += 1
-        self._send_to(proxy, [self._acknack(proxy, [], final=False)])
+        base = proxy.hello_base if proxy.count is None else proxy.expected
+        self._send_to(proxy, [self._acknack(proxy, [], final=False, base=base)])
 
     def _answer_soon(self, proxy: WriterProxy, now: int) -> None:
         at = now + self.settings.response_delay
@@ -449,9 +454,12 @@ class ReaderCore:
                 self._answer_at(proxy, now + min(2 * hold_off << proxy.asks, self.settings.slowest))
         self._send_to(proxy, submessages)
 
-    def _acknack(self, proxy: WriterProxy, missing: list[int], *, final: bool) -> bytes:
+    def _acknack(
+        self, proxy: WriterProxy, missing: list[int], *, final: bool, base: int | None = None
+    ) -> bytes:
         proxy.sent_count = proxy.sent_count + 1 & 0xFFFFFFFF
-        return acknack(self._entity, proxy.entity, proxy.expected, missing, proxy.sent_count, final=final)
+        first = proxy.expected if base is None else base
+        return acknack(self._entity, proxy.entity, first, missing, proxy.sent_count, final=final)
 
     def _nack_frag(self, proxy: WriterProxy, number: int, missing: list[int]) -> bytes:
         proxy.sent_fragment_count = proxy.sent_fragment_count + 1 & 0xFFFFFFFF

@@ -13,8 +13,8 @@ class WriterProxy:
 
     __slots__ = (
         "answer_at", "asked_at", "asked_to", "asks", "assemblies", "count", "entity", "expected", "floor",
-        "fragment_at", "fragment_count", "guid", "held", "hello_at", "hellos", "irrelevant", "last", "owes",
-        "paused", "pending", "places", "prefix", "progress", "reliable", "sent_count",
+        "fragment_at", "fragment_count", "guid", "held", "hello_at", "hello_base", "hellos", "irrelevant", "last",
+        "owes", "paused", "pending", "places", "prefix", "progress", "reliable", "sent_count",
         "sent_fragment_count", "skip",
     )  # fmt: skip
 
@@ -66,4 +66,6 @@ class WriterProxy:
         """Whether something up to there has come since."""
         self.hello_at = NEVER
         """When to ask again whether the writer is there."""
+        self.hello_base = 1
+        """Where the numbers begin in the ACKNACK that does so."""
         self.hellos = 0

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypeAlias
 from muros import rtps
 from muros.rtps import (
     DomainCore,
+    EndpointChanged,
     EndpointData,
     EndpointFound,
     EndpointLost,
@@ -197,6 +198,7 @@ class DdsDomain:
         self._dirty.pop(participant, None)
         if self.core.watchers:
             self.core.tell(Vanished(participant.info()))
+        participant.rtps.close(self.now())
         if self.lead is participant:
             self.lead = self._info_reader = None
             following = next(iter(self.participants.values()), None)
@@ -205,7 +207,6 @@ class DdsDomain:
             else:
                 for prefix in tuple(self.remotes):
                     self._lose(prefix)
-        participant.rtps.close(self.now())
         self.poke()
 
     def forget(self, endpoint: DdsEndpoint) -> None:
@@ -335,6 +336,11 @@ class DdsDomain:
         if participant is self.lead:
             self._find_endpoint(event.endpoint)
 
+    def _endpoint_changed(self, participant: DdsParticipant, event: EndpointChanged) -> None:
+        remote = self.remotes.get(event.endpoint.guid[:12])
+        if participant is self.lead and remote is not None and event.endpoint.guid in remote.endpoints:
+            remote.endpoints[event.endpoint.guid] = event.endpoint
+
     def _endpoint_lost(self, participant: DdsParticipant, event: EndpointLost) -> None:
         if participant is self.lead:
             self._lose_endpoint(event.endpoint)
@@ -412,7 +418,8 @@ class DdsDomain:
         """A participant keeps the books from now on: make them say what it knows."""
         self.lead = participant
         known = participant.rtps
-        there = {each.prefix: each for each in known.participants if each.prefix not in self.participants}
+        ours = {each.prefix for each in self.carrier.core.participants}
+        there = {each.prefix: each for each in known.participants if each.prefix not in ours}
         for prefix in [prefix for prefix in self.remotes if prefix not in there]:
             self._lose(prefix)
         for participant_data in there.values():
@@ -556,6 +563,7 @@ _HANDLERS: Final[dict[type, _Handler]] = {
     ParticipantChanged: DdsDomain._participant_changed,
     ParticipantLost: DdsDomain._participant_lost,
     EndpointFound: DdsDomain._endpoint_found,
+    EndpointChanged: DdsDomain._endpoint_changed,
     EndpointLost: DdsDomain._endpoint_lost,
     rtps.Matched: DdsDomain._matched,
     rtps.Unmatched: DdsDomain._unmatched,
