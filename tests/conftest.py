@@ -8,4 +8,9 @@ from hypothesis import HealthCheck, settings
 # continuous integration each run has the same examples, so that a red run means a change and not bad luck.
 settings.register_profile("dev", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.register_profile("ci", settings.get_profile("dev"), derandomize=True, print_blob=True)
+# Whatever opens the ROS 2 graph without saying where stays on this machine: tests meet nobody else's robots.
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+for name in ("ROS_DOMAIN_ID", "ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS"):
+    os.environ.pop(name, None)
+
 settings.load_profile("ci" if os.environ.get("CI") == "true" else "dev")
