@@ -405,3 +405,35 @@ def test_entity_ids_are_checked_and_given() -> None:
     assert len({process.writer(participant).guid, process.reader(participant).guid, writer.guid}) == 3
     assert process.writer(participant, keyed=True).guid[-1] == 2
     assert process.reader(participant, keyed=True).guid[-1] == 7
+
+
+def test_one_that_misses_the_answer_to_its_announcement_is_told_again_soon() -> None:
+    """It has begun to speak before it listens, and hears no multicast."""
+    world, left, _ = pair()
+    left.core.set_addresses(left.addresses._replace(announce_to=()), left.now)
+    early = left.participant()
+    world.run(20 * SECOND)
+    sent = world.record()
+    left.core.receive(announcement(left), STRANGER, left.now)
+    start = world.network.now
+    world.run(2 * SECOND)
+    told = [
+        (datagram.sent_at - start) / MS
+        for datagram in sent
+        if datagram.receiver == STRANGER and early.data.payload() in datagram.data
+    ]
+    assert told == [0, 100, 400, 1000]
+
+
+def test_one_that_has_answered_is_not_told_again() -> None:
+    world, left, right = pair()
+    left.participant()
+    world.run(20 * SECOND)
+    late = right.participant()
+    sent = world.record()
+    world.run(2 * SECOND)
+    announcements = [
+        d for d in sent if d.receiver == right.meta and left.core.participants[0].data.payload() in d.data
+    ]
+    assert len(announcements) == 1
+    assert late.participants

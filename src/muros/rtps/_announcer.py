@@ -2,25 +2,29 @@
 
 Often in its first second, then with a steady period, to all addresses known in advance; to the participants
 that are known, where they listen, often enough for the lease; and at once to each that is met. Announcements have no
-acknowledgement: what is lost is said again.
+acknowledgement: what is lost is said again. To one just met it is said again soon, unless it talks to us meanwhile:
+it may have begun to listen only after our answer.
 """
 
 from collections.abc import Callable, Iterable
 from typing import Final
 
-from muros.rtps._agenda import Timed
+from muros.rtps._agenda import Agenda, Timed
 from muros.rtps._constants import ENTITYID_SPDP_READER, ENTITYID_SPDP_WRITER
 from muros.rtps._discovery_data import ParticipantData, departure
 from muros.rtps._domain_settings import DomainSettings
-from muros.rtps._endpoint import NEVER, Send
+from muros.rtps._endpoint import MILLISECOND, NEVER, SECOND, Send
 from muros.rtps._peer import Peer
-from muros.rtps._values import INFINITE, Locator
+from muros.rtps._values import INFINITE, GuidPrefix, Locator
 from muros.rtps._wire import data as data_submessage
 
-__all__ = ["Announcer"]
+__all__ = ["Announcer", "Welcome"]
 
 SHARE: Final = 3
 """Announcements within a lease, at least."""
+
+AGAIN: Final = (100 * MILLISECOND, 400 * MILLISECOND, SECOND)
+"""When after it was met a participant that does not talk to us is told again that we are there."""
 
 
 class Announcer(Timed):
@@ -80,9 +84,8 @@ class Announcer(Timed):
         return self._burst[0] if self._burst else now + self._period
 
     def tell(self, peer: Peer) -> None:
-        """Somebody new is there."""
-        if not peer.local:
-            self._announce(peer.discovery)
+        """Announce it to one alone."""
+        self._announce(peer.discovery)
 
     def leave(self) -> None:
         """The participant goes."""
@@ -107,3 +110,39 @@ class Announcer(Timed):
         content = data_submessage(ENTITYID_SPDP_READER, ENTITYID_SPDP_WRITER, self._sequence, self._content)
         for place in places:
             self._send([content], None, place)
+
+
+class Welcome(Timed):
+    """Tells those just met that a participant is there, until they seem to know.
+
+    knows: whether the participant with a prefix has said something to ours.
+    """
+
+    __slots__ = ("_agenda", "_announcer", "_due", "_knows")
+
+    def __init__(self, announcer: Announcer, agenda: Agenda, knows: Callable[[GuidPrefix], bool]) -> None:
+        super().__init__()
+        self._announcer = announcer
+        self._agenda = agenda
+        self._knows = knows
+        self._due: list[tuple[int, Peer]] = []
+
+    def add(self, peer: Peer, now: int) -> None:
+        """Somebody new is there."""
+        if not peer.local:
+            self._announcer.tell(peer)
+            self._due += [(now + offset, peer) for offset in AGAIN]
+            self._agenda.at(self, now + AGAIN[0])
+
+    def wake(self, now: int) -> int:
+        peers = self._announcer.peers
+        self._due = [
+            (at, peer)
+            for at, peer in self._due
+            if peers.get(peer.prefix) is peer and not self._knows(peer.prefix)
+        ]
+        for at, peer in self._due:
+            if at <= now:
+                self._announcer.tell(peer)
+        self._due = [(at, peer) for at, peer in self._due if at > now]
+        return min((at for at, _ in self._due), default=NEVER)

@@ -143,6 +143,11 @@ class Discovery(Timed):
                 self._domain.add_route(remote, listener)
                 self._domain.agenda.at(listener, listener.core.due)
 
+    def is_heard_by(self, prefix: GuidPrefix) -> bool:
+        """Whether somebody's reader of our writers has answered, and so knows of us."""
+        readers = self._writers[ENTITYID_SEDP_PUBLICATIONS_WRITER].core.readers
+        return any(reader.prefix == prefix and reader.count is not None for reader in readers)
+
     def part(self, prefix: GuidPrefix, why: Why, now: int) -> None:
         """Somebody is there no more, and so are its endpoints."""
         known = self.known.get(prefix)

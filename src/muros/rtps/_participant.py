@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from muros.rtps import _matching
-from muros.rtps._announcer import Announcer
+from muros.rtps._announcer import Announcer, Welcome
 from muros.rtps._constants import EntityKind, Pid, is_builtin, is_reader, is_writer
 from muros.rtps._discovery import Discovery
 from muros.rtps._discovery_data import Assertion, EndpointData, ParticipantData
@@ -79,6 +79,7 @@ class ParticipantCore:
         self._announcer = Announcer(
             data, self.send, owner.settings, owner.addresses.announce_to, owner.peers, owner.number, now
         )
+        self._welcome = Welcome(self._announcer, owner.agenda, self._discovery.is_heard_by)
         self._automatic = Assertions(False, owner.agenda, self._discovery.say_alive)
         self._manual = Assertions(True, owner.agenda, self._discovery.say_alive)
 
@@ -235,7 +236,7 @@ class ParticipantCore:
         for prefix in tuple(self._discovery.known):
             self._discovery.part(prefix, Why.CLOSED, now)
         self._discovery.close()
-        for timed in (self._announcer, self._automatic, self._manual):
+        for timed in (self._announcer, self._welcome, self._automatic, self._manual):
             self.owner.agenda.forget(timed)
 
     def readdress(self, data: ParticipantData, now: int) -> None:
@@ -252,7 +253,7 @@ class ParticipantCore:
     def meet(self, peer: Peer, now: int) -> None:
         """Somebody is there."""
         self.tell(ParticipantFound(peer.data, peer.local))
-        self._announcer.tell(peer)
+        self._welcome.add(peer, now)
         self._discovery.meet(peer, now)
 
     def update(self, peer: Peer, before: ParticipantData | None, now: int) -> None:
