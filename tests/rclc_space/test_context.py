@@ -333,6 +333,21 @@ def test_a_full_reader_that_keeps_all_refuses(space: Space) -> None:
     listener.close()
 
 
+def test_publishing_without_spinning_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    context = Context("local:")
+    problems: list[tuple[int, str]] = []
+    context.on_problem(lambda code, text: problems.append((code, text)))
+    publisher = context.node("node").publisher(Int32, "value")
+    assert publisher.publish(Int32())
+    assert problems == []
+    monkeypatch.setattr("muros.space.rclc._middleware.NOT_SPUN_AFTER", -1.0)
+    assert publisher.publish(Int32())
+    assert publisher.publish(Int32())
+    assert [code for code, _ in problems] == [18]
+    assert problems[0][1].startswith("rt/value is published, but nobody spins this context")
+    context.close()
+
+
 def test_foreign_representations(space: Space) -> None:
     context = Context(space)
     got: list[str] = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Final
 
+from muros.client.link import CONNECTED
 from muros.client.names import dds_type, topic_name
 from muros.client.problems import FULL, OFFLINE
 from muros.interfaces import CdrError, InterfaceError
@@ -96,6 +97,8 @@ class Publisher(_Entity):
         with self._lock:
             why = self.gone()
             if not why and self.entity.write(data):
+                if self.context.state != CONNECTED:
+                    self.context.be_spun(self.name)
                 return True
         if why:
             return self.refuse(OFFLINE, len(data), why)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable, Set
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from muros.client import reasons
 from muros.client.link import CONNECTED, WAITING
@@ -35,6 +35,12 @@ if TYPE_CHECKING:
     from muros.space.rclc._ground import Ground
 
 __all__ = ["SpaceMiddleware"]
+
+NOT_SPUN: Final = 18
+"""The code with which `on_problem` is told that nobody spins the context."""
+
+NOT_SPUN_AFTER: Final = 3.0
+"""Seconds in which somebody should have."""
 
 _NEVER = 1_000_000
 _MS = 1_000_000
@@ -65,6 +71,8 @@ class SpaceMiddleware:
         self.closed = False
         self._woken = False
         self._fresh = False
+        self._made = time.monotonic()
+        self._told = False
         self._server = ground.server
         ground.enter(self)
 
@@ -219,6 +227,18 @@ class SpaceMiddleware:
             self.on_problem(code, text)
         else:
             reasons.say(text)
+
+    def be_spun(self, name: str) -> None:
+        """Something was written although nobody has ever spun us: if nobody serves the space either, says so once."""
+        if self._told or not self.ground.served:
+            return
+        if time.monotonic() - max(self._made, self._server.served) > NOT_SPUN_AFTER:
+            self._told = True
+            self.problem(
+                NOT_SPUN,
+                f"{name} is published, but nobody spins this context, so it finds nobody who listens. "
+                "Have an Executor(context) spin, or call its spin_some() now and then.",
+            )
 
     def _be_open(self) -> None:
         if self.closed:

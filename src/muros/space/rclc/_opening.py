@@ -92,7 +92,9 @@ def _prepare(space: Space, key: object, *, owned: bool) -> Ground:
     if owned:
         space.close()
         raise RclError(reason)
-    raise RclError(f"{reason.rstrip('.')}. Make the context in the thread of that loop, or give it a space of its own")
+    raise RclError(
+        f"{reason.rstrip('.')}. Make the context in the thread of that loop, or give it a space of its own"
+    )
 
 
 def _goodbye() -> None:

@@ -49,6 +49,7 @@ class Server:
         self._end = 0.0
         self._uses = 0
         self._loop: _Loop | None = None
+        self.served = time.monotonic()  # when the loop ran last
         self.asleep = False  # the driver is in its selector and does not hold the lock
 
     @property
@@ -118,6 +119,7 @@ class Server:
             if outer is not None:
                 asyncio._set_running_loop(outer)
             self._driver = None
+            self.served = time.monotonic()
             if self._followers:
                 self._changed.notify_all()
             self._tidy()
