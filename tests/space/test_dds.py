@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 
 from muros.findings import Finding, Findings
-from muros.rtps import DomainCore, Locator
+from muros.rtps import DomainCore, DomainReport, Locator
 from muros.space import Requester, Space, identity_of, open_space
 from tests.space.conformance import CHATTER, KEEP_ALL, VirtualTime, numbered, take_all
 
@@ -38,7 +38,7 @@ class TestDds(VirtualTime):
     def make(self) -> Space:
         clock = self.clock
 
-        def carrier(number: int, findings: Findings) -> Nowhere:
+        def carrier(number: int, findings: Findings, report: Callable[[DomainReport], None]) -> Nowhere:
             return Nowhere(number, clock)
 
         return open_space(

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, TypeAlias
 from muros import rtps
 from muros.rtps import (
     DomainCore,
+    DomainReport,
     EndpointChanged,
     EndpointData,
     EndpointFound,
@@ -43,7 +44,7 @@ from muros.space._graph import (
     Vanished,
 )
 from muros.space._participant import READER_KIND, WRITER_KIND
-from muros.space._qos import Mismatch, mismatches
+from muros.space._qos import Mismatch, duration, mismatches
 from muros.space._timers import Timer
 from muros.space._values import GID_SIZE
 from muros.space.dds._dialects import Dialect
@@ -57,6 +58,7 @@ from muros.space.dds._discovery_info import (
 )
 from muros.space.dds._endpoints import DdsEndpoint, DdsReader, DdsWriter, encapsulated
 from muros.space.dds._names import service_of, type_hash
+from muros.space.dds._problems import report_domain
 from muros.space.dds._remote import Remote
 from muros.space.dds._wire_qos import from_wire, to_wire
 
@@ -108,15 +110,15 @@ class DdsDomain:
         self,
         number: int,
         core: Core,
-        carrier: Carrier,
+        carrier: Callable[[Callable[[DomainReport], None]], Carrier],
         *,
         ros_distro: str | None = None,
         properties: tuple[tuple[str, str], ...] = (),
     ) -> None:
         self.number = number
         self.core = core
-        self.carrier = carrier
-        self.now = carrier.clock
+        self.carrier = carrier(self._report)
+        self.now = self.carrier.clock
         self.properties = properties
         self.opened = False
         limits = core.limits
@@ -383,6 +385,40 @@ class DdsDomain:
         told = partial(_reports.mismatched, core, *names, local.topic.name, reasons, who=local.owner)
         core.notices.append(told)
 
+    def _liveliness_lost(self, participant: DdsParticipant, event: rtps.LivelinessLost) -> None:
+        local = self.endpoints.get(event.local)
+        if local is not None:
+            self.core.report(
+                "liveliness-lost",
+                who=local.owner,
+                subject=local.topic.name,
+                what=f"{{n}} time{{s}} the writer of {local.topic.name} of {local.owner} was taken for dead",
+                why=f"it wrote nothing for longer than its lease of {duration(local.qos.lease)}",
+                remedy="Write more often, or give it a longer lease or automatic liveliness",
+            )
+
+    def _liveliness_changed(self, participant: DdsParticipant, event: rtps.LivelinessChanged) -> None:
+        local = self.endpoints.get(event.local)
+        if local is not None and not event.alive:
+            self.core.report(
+                "writer-silent",
+                who=local.owner,
+                subject=local.topic.name,
+                what=f"{{n}} time{{s}} a writer of {local.topic.name} was taken for dead by {local.owner}",
+                why=f"{self.name_of(event.remote)} did not say in time that it is alive",
+                remedy="Look at that writer, or at the network between",
+            )
+
+    def _report(self, report: DomainReport) -> None:
+        """RTPS noticed something that concerns no endpoint of ours."""
+        own = self.participants.get(report.prefix)
+        remote = self.remotes.get(report.prefix)
+        name = own.owner if own is not None else remote.infos[0].owner if remote is not None else ""
+        if not name and report.prefix:
+            name = f"participant {report.prefix.hex()}"
+        self.core.notices.append(partial(report_domain, self.core, self.number, report, name))
+        self.core.need(self.core.clock())
+
     def _trouble(self, participant: DdsParticipant, event: Trouble) -> None:
         local = self.endpoints.get(event.local)
         if local is not None:
@@ -569,4 +605,6 @@ _HANDLERS: Final[dict[type, _Handler]] = {
     rtps.Unmatched: DdsDomain._unmatched,
     rtps.Incompatible: DdsDomain._incompatible,
     Trouble: DdsDomain._trouble,
+    rtps.LivelinessLost: DdsDomain._liveliness_lost,
+    rtps.LivelinessChanged: DdsDomain._liveliness_changed,
 }

@@ -10,7 +10,13 @@ from muros.space._participant import PARTICIPANT_ID
 from muros.space.dds._dialects import Dialect
 from muros.space.dds._discovery_info import NodeEntities
 
-__all__ = ["Remote"]
+__all__ = ["VERSION", "Remote"]
+
+VERSION: Final = "muros.version"
+"""Property by which participants of muros tell what they are: no vendor id is assigned to it."""
+
+VENDOR_LENGTH: Final = 64
+"""Characters shown of what a participant says it is."""
 
 _HOST: Final = ("dds.sys_info.hostname", "fastdds.physical_data.host", "__Hostname")
 _PID: Final = ("dds.sys_info.process_id", "fastdds.physical_data.process", "__Pid")
@@ -28,7 +34,8 @@ class Remote:
         self._nodes: tuple[ParticipantInfo, ...] = ()
         self._node_of: dict[bytes, ParticipantInfo] = {}
         properties = dict(data.properties)
-        vendor = vendor_name(data.vendor)
+        version = properties.get(VERSION)
+        vendor = vendor_name(data.vendor) if version is None else f"muros {version}"[:VENDOR_LENGTH]
         self.bare: Final = ParticipantInfo(
             gid=data.guid,
             name="",

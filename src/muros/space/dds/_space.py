@@ -6,16 +6,19 @@ import os
 import platform
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Final
+from functools import partial
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
+from muros import __version__
 from muros.findings import Findings
-from muros.rtps import MAX_DOMAIN
+from muros.rtps import MAX_DOMAIN, DomainReport
 from muros.space._core import Core, Limits
 from muros.space._door import ClosedError, SpaceError
 from muros.space._endpoint import Closing
 from muros.space._participant import prefix_of, prefixes
 from muros.space.dds._domain import Carrier, DdsDomain
 from muros.space.dds._participant import DdsParticipant
+from muros.space.dds._remote import VERSION
 from muros.space.dds._view import DdsGraph
 
 if TYPE_CHECKING:
@@ -30,6 +33,10 @@ NETWORK: Final = ("interfaces", "peers", "range", "network", "fault", "carrier")
 OTHERS: Final = ("ros_distro",)
 
 
+CarrierFactory: TypeAlias = Callable[[int, Findings, Callable[[DomainReport], None]], Carrier]
+"""Makes what carries a domain of that number, given where to tell of faults of the network and of others."""
+
+
 class DdsSpace(Closing):
     """A space in the ROS 2 graph. See `muros.space.Space`."""
 
@@ -37,7 +44,7 @@ class DdsSpace(Closing):
         self,
         *,
         domain: int,
-        carrier: Callable[[int, Findings], Carrier],
+        carrier: CarrierFactory,
         findings: Findings | None = None,
         clock: Callable[[], int] = time.time_ns,
         limits: Limits | None = None,
@@ -136,7 +143,7 @@ class DdsSpace(Closing):
             home = DdsDomain(
                 number,
                 self._core,
-                self._carrier(number, self.findings),
+                partial(self._carrier, number, self.findings),
                 ros_distro=self._ros_distro,
                 properties=_properties(),
             )
@@ -213,14 +220,18 @@ def _settings(domain: int | None, options: dict[str, Any]) -> NetworkSettings:
 
 def _networks(
     settings: NetworkSettings, clock: Callable[[], int], fault: Callable[[bytes], bool] | None
-) -> Callable[[int, Findings], Carrier]:
+) -> CarrierFactory:
     from dataclasses import replace
 
     from muros.rtps.net import Network
 
-    def network(number: int, findings: Findings) -> Carrier:
+    def network(number: int, findings: Findings, report: Callable[[DomainReport], None]) -> Carrier:
         return Network(
-            replace(settings, domain=number), wall=lambda: clock() / 1e9, findings=findings, fault=fault
+            replace(settings, domain=number),
+            wall=lambda: clock() / 1e9,
+            findings=findings,
+            report=report,
+            fault=fault,
         )
 
     return network
@@ -234,6 +245,7 @@ def _seed() -> bytes:
 def _properties() -> tuple[tuple[str, str], ...]:
     """Where this process runs, for others to show."""
     return (
+        (VERSION, __version__),
         ("dds.sys_info.hostname", platform.node()),
         ("dds.sys_info.process_id", str(os.getpid())),
     )
