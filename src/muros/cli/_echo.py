@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from muros import interfaces
+from muros.cli._learn import make_known
 from muros.cli._names import full_name, learn_types, message_class, ros_topics
 from muros.cli._qos import chosen_qos, fitted_qos, has_choice
 from muros.cli._tool import CommandError, Tool
@@ -29,6 +30,8 @@ async def echo(tool: Tool, arguments: argparse.Namespace) -> None:
     learn_types(arguments)
     name = full_name(arguments.topic_name)
     type_name = await type_to_read(tool, name, arguments.message_type)
+    if not arguments.raw:
+        await make_known(tool, name, type_name)
     printer = _Printer(tool, arguments, name, type_name)
     qos = reader_qos(tool, name, arguments)
 

@@ -37,7 +37,7 @@ def graph_checks(tool: Tool) -> Iterator[Result]:
         )
         return
     services = ros_services(tool)
-    hosts = sorted({p.host for p in others if p.host})
+    hosts = sorted({_host(p) for p in others if p.host})
     yield fine(
         f"{_count(len(nodes), 'node')}, {_count(len(topics), 'topic')} and {_count(len(services), 'service')} "
         f"in domain {tool.domain}" + (f", on {_listed(hosts)}" if len(hosts) > 1 else "")
@@ -164,6 +164,11 @@ def _who(participant: ParticipantInfo) -> str:
         if part
     )
     return node_name(participant) + (f" ({place})" if place else "")
+
+
+def _host(participant: ParticipantInfo) -> str:
+    """The name of its machine, without the number that some put behind it."""
+    return participant.host.partition(":")[0]
 
 
 def _listed(names: list[str]) -> str:

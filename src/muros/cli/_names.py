@@ -134,18 +134,18 @@ def required_class(type_name: str) -> type[Any]:
     try:
         return interfaces.message(type_name)
     except InterfaceError as error:
-        raise CommandError(f"{error}{_hint(type_name)}") from None
+        raise _unknown(error, type_name) from None
 
 
 def type_of_service(type_name: str) -> type[interfaces.ServiceType]:
     """The class of a service type. CommandError says how to make it known."""
+    full = interfaces.split_type(type_name, "srv")
     try:
-        full = interfaces.split_type(type_name, "srv")
         if full.kind != "srv":
             raise CommandError(f"{type_name} is no service: those are called package/srv/Type", 2)
         return interfaces.service(type_name)
     except InterfaceError as error:
-        raise CommandError(f"{error}{_hint(type_name)}") from None
+        raise _unknown(error, "/".join(full)) from None
 
 
 def service_of(name: str, type_name: str) -> Service:
@@ -162,11 +162,14 @@ def service_of(name: str, type_name: str) -> Service:
     )
 
 
-def _hint(type_name: str) -> str:
-    package = type_name.partition("/")[0]
-    if package in interfaces.packages():
-        return ""
-    return f"; if you have its definition, say --types FOLDER, where FOLDER holds {package}/msg/*.msg"
+def _unknown(error: InterfaceError, type_name: str) -> CommandError:
+    """The line for a type without a usable definition; if its whole package is unknown, with what to do."""
+    package, _, rest = type_name.partition("/")
+    if not rest or package in interfaces.packages():
+        return CommandError(str(error))
+    return CommandError(
+        f"unknown type '{type_name}': say --types FOLDER, where FOLDER holds {package}/{rest}.{rest.partition('/')[0]}"
+    )
 
 
 def _unique(names: Iterable[str]) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ import yaml
 
 from muros import interfaces
 from muros.cli._echo import tell_of_mismatches
+from muros.cli._learn import make_known
 from muros.cli._names import full_name, learn_types, required_class, ros_topics
 from muros.cli._qos import chosen_qos
 from muros.cli._tool import CommandError, Tool
@@ -31,7 +32,11 @@ async def publish(tool: Tool, arguments: argparse.Namespace) -> None:
     """Publish as the arguments say."""
     learn_types(arguments)
     name = full_name(arguments.topic_name)
-    made = required_class("/".join(interfaces.split_type(arguments.message_type)))
+    type_name = "/".join(interfaces.split_type(arguments.message_type))
+    if not interfaces.known(type_name):
+        await tool.discover(until=lambda _: any(t.name == name for t in ros_topics(tool)))
+        await make_known(tool, name, type_name)
+    made = required_class(type_name)
     messages = _messages(made, arguments)
     try:
         qos = chosen_qos(arguments)

@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple, Protocol
 
 from muros import interfaces
 from muros.cli._echo import decoded, expression, reader_qos, tell_of_mismatches, type_to_read
+from muros.cli._learn import make_known
 from muros.cli._names import full_name, learn_types, required_class
 from muros.cli._tool import CommandError, Subscription, Tool
 from muros.space import Sample, Topic
@@ -150,6 +151,8 @@ async def measure(what: str, tool: Tool, arguments: argparse.Namespace) -> None:
     subscriptions: list[Subscription] = []
     for name in names:
         type_name = await type_to_read(tool, name, None)
+        if what == "delay" or (what == "hz" and arguments.filter_expr):
+            await make_known(tool, name, type_name)
         meter = meters[name] = _meter(what, type_name, arguments)
         topic = Topic(interfaces.dds_topic(name), interfaces.dds_type_name(type_name))
         subscription = tool.subscribe(topic, reader_qos(tool, name, arguments), _adder(meter))

@@ -115,6 +115,7 @@ async def call(tool: Tool, arguments: argparse.Namespace) -> None:
         PRESETS["services_default"],
         lambda number, data: answers.put_nowait((number, data)),
     )
+    await tool.discover(until=lambda _: requester.servers > 0)
     told = False
     end = _end(arguments.timeout)
     while not requester.servers:
