@@ -136,11 +136,22 @@ def test_closed_spaces_and_contexts(space: Space) -> None:
     assert not context.ping()
     assert client.call(AddTwoInts.Request(), timeout=0.05) is None
     assert not Executor(context).spin_some(30.0), "it does not wait for what cannot come"
-    with pytest.raises(RclError, match="the context is closed; make a new one"):
-        context.node("late")
+    for use in (lambda: context.node("late"), lambda: node.publisher(Int32, "late")):
+        with pytest.raises(RclError, match="the context is closed; make a new one"):
+            use()
     space.close()
     with pytest.raises(RclError, match="the space is closed"):
         Context(space)
+
+
+def test_a_node_that_was_destroyed_makes_nothing(space: Space) -> None:
+    context = Context(space)
+    node = context.node("node", "lab")
+    node.destroy()
+    with pytest.raises(RclError, match="node /lab/node was destroyed; make a new one"):
+        node.subscription(Int32, "value", None)
+    assert not context.handles
+    context.close()
 
 
 def test_names_may_be_as_long_as_ros_takes_them(space: Space) -> None:

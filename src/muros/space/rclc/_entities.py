@@ -9,6 +9,7 @@ from muros.client.names import dds_type, topic_name
 from muros.client.problems import FULL, OFFLINE
 from muros.interfaces import CdrError, InterfaceError
 from muros.interfaces import message as message_class
+from muros.rclc.errors import RclError
 from muros.space import _door
 from muros.space._qos import Qos
 from muros.space._values import CDR_BE, CDR_LE, Sample, Service, Topic
@@ -37,7 +38,10 @@ class Node:
         full = f"{namespace.rstrip('/')}/{name}"
         topic_name("", full, "", LONGEST_NAME)  # complains now about what cannot be
         self.context = context
-        self.participant = context.ground.space.participant(name, namespace=namespace, domain=domain)
+        try:
+            self.participant = context.ground.space.participant(name, namespace=namespace, domain=domain)
+        except _door.SpaceError as error:  # there is no network for this domain
+            raise RclError(str(error)) from None
 
     def destroy(self) -> None:
         """Takes it out of the space, with everything made on it."""
@@ -52,6 +56,9 @@ class _Entity:
     """What all of them have in common. `name` is that in DDS, of a service that in ROS."""
 
     def __init__(self, node: Node, name: str, type_name: str) -> None:
+        node.context.be_open()
+        if node.participant.closed:
+            raise RclError(f"node {node.participant.owner} was destroyed; make a new one")
         self.node = node
         self.name = name
         self.type_name = type_name

@@ -89,10 +89,10 @@ class SpaceMiddleware:
     # What is made
 
     def participant(self, name: str, domain: int = 0, /) -> Node:
-        """A node."""
+        """A node. RclError if the context is closed, or its domain cannot be had here."""
         namespace, _, base = name.rpartition("/")
         with self._server.lock:
-            self._be_open()
+            self.be_open()
             made = Node(self, base, namespace or "/", domain)
             self.nodes.append(made)
         return made
@@ -228,6 +228,11 @@ class SpaceMiddleware:
         else:
             reasons.say(text)
 
+    def be_open(self) -> None:
+        """RclError if it is closed."""
+        if self.closed:
+            raise RclError("the context is closed; make a new one")
+
     def be_spun(self, name: str) -> None:
         """Something was written although nobody has ever spun us: if nobody serves the space either, says so once."""
         if self._told or not self.ground.served:
@@ -239,10 +244,6 @@ class SpaceMiddleware:
                 f"{name} is published, but nobody spins this context, so it finds nobody who listens. "
                 "Have an Executor(context) spin, or call its spin_some() now and then.",
             )
-
-    def _be_open(self) -> None:
-        if self.closed:
-            raise RclError("the context is closed; make a new one")
 
     def _enter(self, state: int) -> Exception | None:
         """Be in a state and tell; what the callback raised."""
