@@ -1,12 +1,14 @@
 """CDR for boards: what generated message code calls to check, read and write a caller's buffer.
 
+Messages of fixed size need no more than this module; those with strings load ``cdr_texts``, with sequences of numbers
+``cdr_lists`` too. What many classes would repeat stands there once.
+
 Everything is little-endian XCDR1 (DDS-XTypes 1.3, 7.4.1): a value stands at a multiple of its size, counted from the
 first byte of the body. Integers are put together by shifts, since ``struct.unpack_from`` allocates a tuple on boards;
 with values of less than 31 bits nothing here allocates unless it says so.
 """
 
 from array import array
-from struct import pack_into
 
 from muros.compat import MPY, const
 
@@ -47,54 +49,6 @@ def integer(buf: "bytearray", p: int, size: int, signed: int) -> int:
         i -= 1
         n = n << 8 | buf[i]
     return n
-
-
-def count(buf: "bytearray", p: int, end: int, least: int) -> int:
-    """The count at ``p`` of elements that take at least ``least`` bytes each, checked against ``end``."""
-    need(end - p, 4)
-    n = integer(buf, p, 4, 0)
-    need(end - p - 4, n * least)
-    return n
-
-
-def text(buf: "bytearray", p: int, n: int) -> str:
-    """The string of ``n`` bytes with its NUL at ``p``. Allocates the string and a view."""
-    if n == 0:
-        return ""
-    try:
-        if buf[p + n - 1] == 0:
-            return str(memoryview(buf)[p : p + n - 1], "utf-8")
-    except ValueError:
-        pass
-    raise CdrError("bad string")
-
-
-def encoded(value: "str | bytes | bytearray", memo: "list[Any]") -> "bytes | bytearray":
-    """The bytes of a string attribute; a str is encoded once and kept in ``memo`` until it is replaced."""
-    if isinstance(value, str):
-        if value is not memo[0]:
-            memo[1] = value.encode()
-            memo[0] = value
-        return memo[1]  # type: ignore[no-any-return]
-    return value
-
-
-def put_text(buf: "bytearray", p: int, value: "bytes | bytearray") -> int:
-    """Writes a string: its count, its bytes, NUL; returns the offset behind it."""
-    n = len(value)
-    pack_into("<I", buf, p, n + 1)
-    p += 4
-    buf[p : p + n] = value
-    buf[p + n] = 0
-    return p + n + 1
-
-
-def pad(buf: "bytearray", p: int, start: int, align: int) -> int:
-    """Zeroes up to the next multiple of ``align`` from ``start``; returns its offset."""
-    while p - start & align - 1:
-        buf[p] = 0
-        p += 1
-    return p
 
 
 def block(values: "Sequence[Any]", code: str, n: int) -> "Any":

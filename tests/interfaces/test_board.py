@@ -231,7 +231,10 @@ print("done")
 @cache
 def board_files() -> Tree:
     files = sources(CASES)
-    return {**board_tree(["compat.py", "cdr.py"]), **{path: text.encode() for path, text in files.items()}}
+    return {
+        **board_tree(["compat.py", "cdr.py", "cdr_texts.py", "cdr_lists.py"]),
+        **{path: text.encode() for path, text in files.items()},
+    }
 
 
 def relay() -> str:
@@ -323,7 +326,8 @@ def test_a_class_fits_its_budget(name: str, nested: int) -> None:
     assert len(Registry(DISTRO).closure(Registry(DISTRO).message(name))) == nested
     package, kind, type_name = name.split("/")
     packages = sorted({path.partition("/")[0] for path in board_files() if "/msg/" in path})
-    before = f"import {', '.join(f'{p}.msg' for p in packages)}\nfrom std_msgs.msg import Int32, String\n"
+    before = f"import muros.cdr_lists, {', '.join(f'{p}.msg' for p in packages)}\n"
+    before += "from std_msgs.msg import Int32, String\n"
     imported = f"from {package}.{kind} import {type_name}"
     assert _least_cost(imported, before) <= 1200 + 400 * nested
 

@@ -1,13 +1,15 @@
 """Code of board classes: methods that MicroPython runs without touching the heap where that is possible.
 
-Compared with host classes the code is small rather than fast: no constants per format, one position variable, helpers
-of :mod:`muros.cdr` wherever a second use pays for them. Runs of integers are read one by one, since unpacking would
-allocate a tuple; runs with a float are unpacked at once, since a float takes heap anyway.
+Compared with host classes the code is small rather than fast: no constants per format, one position variable, and
+helpers of ``muros.cdr``, ``cdr_texts`` and ``cdr_lists`` for whatever a second use pays for. What is written leaves
+the heap alone, and so does what is read of a message of fixed size without floats: its integers are read one by one,
+since unpacking would allocate a tuple. Other messages take heap when they are read anyway; runs are unpacked there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 
 from muros.interfaces._encoder import Code, format_text
 from muros.interfaces._layout import (
@@ -15,6 +17,7 @@ from muros.interfaces._layout import (
     At,
     Block,
     Dummy,
+    Group,
     Leaf,
     Many,
     Numbers,
@@ -24,103 +27,118 @@ from muros.interfaces._layout import (
     after,
     fixed_size,
     least_size,
+    leaves,
     loop,
 )
+from muros.interfaces._model import Message
 
 Blank = Callable[[str, str], list[str]]
 """(full name of a message, variable) -> lines that put an instance without values into the variable."""
 
+_WORTH = 12  # leaves that a type must save, by being written out only once, before its code becomes functions
 
-class Memos:
-    """The attributes in which a message keeps the encoded form of its strings: one for each string."""
 
-    def __init__(self) -> None:
-        self._names: dict[Path, str] = {}
+class Memo:
+    """Where a message keeps the encoded form of its strings: ``_memo``, a list with two places for each string."""
 
-    def name(self, path: Path) -> str:
-        return self._names.setdefault(path, f"_{len(self._names) + 1}")
+    def __init__(self, found: Sequence[Leaf]) -> None:
+        self.paths: list[Path] = [leaf.path for leaf in found if isinstance(leaf, Text)]
+        self._name = "memo" if len(self.paths) > 1 else "self._memo"
 
-    def names(self) -> list[str]:
-        return list(self._names.values())
+    def arguments(self, path: Path) -> str:
+        """What helpers for the string at that path are told: the list, and the place if it is not the first."""
+        place = 2 * self.paths.index(path)
+        return f", {self._name}, {place}" if place else f", {self._name}"
+
+    def start(self) -> list[str]:
+        """The lines before any use."""
+        return ["memo = self._memo"] if len(self.paths) > 1 else []
 
 
 class Shared:
-    """The messages that occur in several sequences of one message: their code becomes functions of the module."""
+    """The nested types that occur so often in one message that their code becomes functions of the module."""
 
-    def __init__(self, found: Sequence[Leaf], blank: Blank) -> None:
-        self._blank = blank
-        self._bodies: dict[str, tuple[Leaf, ...]] = {}
-        self._often: set[str] = set()
-        self._count(found)
+    def __init__(self, message: Message, find: Callable[[str], Message]) -> None:
+        self._find = find
+        self._names: dict[str, str] = {}
+        if fixed_size(leaves(message, find)) is not None:
+            return
+        counts: Counter[str] = Counter()
+        self._count(message, counts)
+        for name, times in sorted(counts.items()):
+            if (times - 1) * _number_of(leaves(find(name), find)) >= _WORTH:
+                short = name.rpartition("/")[2]
+                self._names[name] = name.replace("/", "_") if short in self._names.values() else short
 
-    def __contains__(self, type_name: str) -> bool:
-        return type_name in self._often
+    def __contains__(self, type_name: object) -> bool:
+        return type_name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
 
     def function(self, verb: str, type_name: str) -> str:
-        """The name of the function that sizes, writes or reads one element."""
-        return f"_{verb}_{type_name.replace('/', '_')}"
+        """The name of the function that makes, sizes, writes or reads one message."""
+        return f"_{verb}_{self._names[type_name]}"
 
-    def lines(self) -> list[str]:
-        """All functions, as lines of a module."""
-        lines: list[str] = []
-        for name in sorted(self._often):
-            body = self._bodies[name]
-            sizer, writer, reader = _Sizer(None, self), _Writer(None, self), _Reader(self._blank, self)
-            for verb, arguments, code in (
-                ("size", "m, p", sizer.element(body)),
-                ("write", "m, buf, p, off", writer.element(body)),
-                ("read", "m, buf, p, off, e", reader.element(body)),
-            ):
-                lines += [f"def {self.function(verb, name)}({arguments}):", *(f"    {line}" for line in code)]
-        return lines
+    def leaves(self, message: Message) -> tuple[Leaf, ...]:
+        """The leaves of a message, shared types kept together."""
+        return leaves(message, self._find, kept=self._names)
 
-    def _count(self, found: Sequence[Leaf]) -> None:
-        for leaf in found:
-            if isinstance(leaf, Many) and leaf.type_name in self._bodies:
-                self._often.add(leaf.type_name)
-            elif isinstance(leaf, Many):
-                if leaf.type_name:
-                    self._bodies[leaf.type_name] = leaf.body
-                self._count(leaf.body)
+    def functions(self, type_name: str, blank: Blank) -> dict[str, list[str]]:
+        """The functions of a shared type but the one that makes it: name -> lines."""
+        body = self.leaves(self._find(type_name))
+        made: dict[str, list[str]] = {}
+        for verb, arguments, code in (
+            ("size", "m, p", _Sizer(None, self).element(body)),
+            ("write", "m, buf, p, off", _Writer(None, self).element(body)),
+            ("read", "m, buf, at", _Reader(blank, self).element(body)),
+        ):
+            name = self.function(verb, type_name)
+            made[name] = [f"def {name}({arguments}):", *(f"    {line}" for line in code)]
+        return made
+
+    def _count(self, message: Message, counts: Counter[str]) -> None:
+        for field in message.fields:
+            if field.type.nested:
+                counts[field.type.base] += 1
+                if counts[field.type.base] == 1:
+                    self._count(self._find(field.type.base), counts)
 
 
-def size_lines(found: Sequence[Leaf], memos: Memos, shared: Shared) -> list[str]:
+def size_lines(found: Sequence[Leaf], memo: Memo, shared: Shared) -> list[str]:
     """The body of ``size(self)``."""
     size = fixed_size(found)
     if size is not None:
         return [f"return {size}"]
-    return _Sizer(memos, shared).run(found)
+    return _Sizer(memo, shared).run(found)
 
 
-def write_lines(found: Sequence[Leaf], memos: Memos, shared: Shared) -> list[str]:
+def write_lines(found: Sequence[Leaf], memo: Memo, shared: Shared) -> list[str]:
     """The body of ``write(self, buf, off)``."""
-    return _Writer(memos, shared).run(found)
+    return _Writer(memo, shared).run(found)
 
 
 def read_lines(found: Sequence[Leaf], blank: Blank, shared: Shared) -> list[str]:
     """The body of ``read(self, buf, off, n)``; ``blank`` gives the lines that make an element to be filled."""
+    size = fixed_size(found)
+    if list(found) == [Dummy()]:
+        return ["need(4, n)"]
+    if size is not None and not any(isinstance(leaf, Many) for leaf in found):
+        return _FixedReader(shared).run(found, size)
     return _Reader(blank, shared).run(found)
 
 
-class _Walker:
-    """What sizing, writing and reading share: the position as ``base + const`` and the walk over the leaves."""
+def _number_of(found: Sequence[Leaf]) -> int:
+    return sum(1 + _number_of(leaf.body) if isinstance(leaf, Many) else 1 for leaf in found)
 
-    def __init__(self, base: str, shared: Shared) -> None:
+
+class _Walker:
+    """What sizing, writing and reading share: the walk over the leaves with what is known of their alignment."""
+
+    def __init__(self, shared: Shared) -> None:
         self.code = Code("self")
         self._shared = shared
         self._at = START
-        self._base = base
-        self._const = 0
-
-    def element(self, found: Sequence[Leaf]) -> list[str]:
-        """The body of a function for one element ``m`` at ``p``, of whose alignment nothing is known."""
-        self.code = Code("m")
-        self._at = At(1, 0)
-        self._base = "p"
-        self._walk(found)
-        self._flush()
-        self.code.line(f"return {self._position()}")
-        return self.code.lines
 
     def _walk(self, found: Sequence[Leaf]) -> None:
         for leaf in found:
@@ -130,6 +148,28 @@ class _Walker:
 
     def _leaf(self, leaf: Leaf) -> None:
         raise NotImplementedError
+
+    def _flush(self) -> None:
+        """Ends a run."""
+
+
+class _Placed(_Walker):
+    """A walk that knows the position: ``base + const``."""
+
+    def __init__(self, base: str, shared: Shared) -> None:
+        super().__init__(shared)
+        self._base = base
+        self._const = 0
+
+    def element(self, found: Sequence[Leaf]) -> list[str]:
+        """The body of a function for one message ``m`` at ``p``, of whose alignment nothing is known."""
+        self.code = Code("m")
+        self._at = At(1, 0)
+        self._base = "p"
+        self._walk(found)
+        self._flush()
+        self.code.line(f"return {self._position()}")
+        return self.code.lines
 
     def _position(self, more: int = 0) -> str:
         const = self._const + more
@@ -143,37 +183,31 @@ class _Walker:
             self.code.line(f"p = {expression}")
         self._base, self._const = "p", 0
 
-    def _loop(
-        self, leaf: Many, element: str, head: str, function: str, arguments: str, start: Sequence[str] = ()
-    ) -> None:
+    def _loop(self, leaf: Many, items: str, verb: str, arguments: str) -> None:
         """A loop over the elements of an array or sequence, which begin at the present position."""
         self._moved(self._position())
-        self.code.line(head)
+        element = self.code.temp("e")
+        self.code.line(f"for {element} in {items}:")
         saved = self.code.enter(element)
-        for line in start:
-            self.code.line(line)
         self._at = loop(leaf.body, self._at)
         if leaf.type_name in self._shared:
-            self._moved(f"{self._shared.function(function, leaf.type_name)}({element}, {arguments})")
+            self._moved(f"{self._shared.function(verb, leaf.type_name)}({element}, {arguments})")
         else:
             self._walk(leaf.body)
-        self._flush()
+            self._flush()
         self._moved(self._position())
         self.code.leave(saved)
 
-    def _flush(self) -> None:
-        """Ends a run."""
 
-
-class _Sizer(_Walker):
-    def __init__(self, memos: Memos | None, shared: Shared) -> None:
+class _Sizer(_Placed):
+    def __init__(self, memo: Memo | None, shared: Shared) -> None:
         super().__init__("", shared)
-        self._memos = memos
+        self._memo = memo
 
     def run(self, found: Sequence[Leaf]) -> list[str]:
         self._walk(found)
         self.code.line(f"return {self._position()}")
-        return self.code.lines
+        return (self._memo.start() if self._memo else []) + self.code.lines
 
     def _leaf(self, leaf: Leaf) -> None:
         match leaf:
@@ -184,40 +218,41 @@ class _Sizer(_Walker):
             case Dummy():
                 self._const += 1
             case Text():
-                self._skip(4, 5)
-                value = _bytes_of(self.code, leaf, self._memos)
-                self._moved(f"{self._position()} + len({value})")
+                value = self.code.place(leaf.path)
+                memo = _memo_arguments(self.code, leaf, self._memo)
+                self._moved(f"text_size({self._position()}, {value}{memo})")
             case Numbers():
                 count = f"len({self.code.place(leaf.path)})"
-                self._skip(4, 4)
-                if self._at.aligned(4).moved(4).pad(leaf.size) == 0:
-                    self._moved(f"{self._position()} + {_times(leaf.size, count)}")
-                    return
-                self._moved(self._position())
-                name = self.code.temp("n")
-                self.code.line(f"{name} = {count}")
-                self.code.line(f"if {name}:")
-                self.code.line(f"    p = (p + {leaf.size - 1} & -{leaf.size}) + {leaf.size} * {name}")
+                self._moved(f"list_size({self._position()}, {leaf.size}, {leaf.size}, {count})")
             case Many():
-                items = self.code.place(leaf.path)
-                if not leaf.count:
-                    self._skip(4, 4)
-                    self._at = self._at.aligned(4).moved(4)
-                element = self.code.temp("e")
-                self._loop(leaf, element, f"for {element} in {items}:", "size", "p")
+                self._many(leaf)
+            case Group():
+                function = self._shared.function("size", leaf.type_name)
+                self._moved(f"{function}({self.code.place(leaf.path)}, {self._position()})")
+
+    def _many(self, leaf: Many) -> None:
+        items = self.code.place(leaf.path)
+        stride = None if leaf.count else _stride(leaf.body)
+        if stride:
+            self._moved(f"list_size({self._position()}, {stride[0]}, {stride[1]}, len({items}))")
+            return
+        if not leaf.count:
+            self._skip(4, 4)
+            self._at = self._at.aligned(4).moved(4)
+        self._loop(leaf, items, "size", "p")
 
     def _skip(self, align: int, size: int) -> None:
         pad = self._at.pad(align)
         if pad is None:
-            self._moved(f"{self._position()} + {align - 1} & -{align}")
+            self._base, self._const = f"({self._position(align - 1)} & -{align})", 0
             pad = 0
         self._const += pad + size
 
 
-class _Writer(_Walker):
-    def __init__(self, memos: Memos | None, shared: Shared) -> None:
+class _Writer(_Placed):
+    def __init__(self, memo: Memo | None, shared: Shared) -> None:
         super().__init__("off", shared)
-        self._memos = memos
+        self._memo = memo
         self._run: list[str] = []
         self._values: list[str] = []
         self._run_size = 0
@@ -226,7 +261,7 @@ class _Writer(_Walker):
         self._walk(found)
         self._flush()
         self.code.line(f"return {self._position()}")
-        return self.code.lines
+        return (self._memo.start() if self._memo else []) + self.code.lines
 
     def _leaf(self, leaf: Leaf) -> None:
         match leaf:
@@ -241,44 +276,27 @@ class _Writer(_Walker):
                 self._run.append("x")
                 self._run_size += 1
             case Text():
-                value = _bytes_of(self.code, leaf, self._memos)
-                self._aligned(4)
-                if leaf.bound:
-                    name = self.code.temp("s")
-                    self.code.line(f"{name} = {value}")
-                    self.code.line(f"need({leaf.bound}, len({name}))")
-                    value = name
-                self._moved(f"put_text(buf, {self._position()}, {value})")
+                memo = _memo_arguments(self.code, leaf, self._memo)
+                bound = f", bound={leaf.bound}" if leaf.bound else ""
+                self._call("put_text", f"{self.code.place(leaf.path)}{memo}{bound}")
             case Numbers():
-                self._numbers(leaf)
+                bound = f", {leaf.bound}" if leaf.bound else ""
+                self._call("put_numbers", f'{self.code.place(leaf.path)}, "{leaf.code}", {leaf.size}{bound}')
             case Many():
                 self._many(leaf)
+            case Group():
+                value = self.code.place(leaf.path)
+                self._flush()
+                function = self._shared.function("write", leaf.type_name)
+                self._moved(f"{function}({value}, buf, {self._position()}, off)")
 
-    def _numbers(self, leaf: Numbers) -> None:
-        name, count = self.code.temp("v"), self.code.temp("n")
-        self.code.line(f"{name} = {self.code.place(leaf.path)}")
-        self.code.line(f"{count} = len({name})")
-        if leaf.bound:
-            self.code.line(f"need({leaf.bound}, {count})")
-        self._value(4, "I", count, 4)
-        padded = self._at.aligned(4).moved(4).pad(leaf.size) != 0
+    def _call(self, function: str, arguments: str) -> None:
+        """Calls a helper, which aligns by itself and returns the position behind what it wrote."""
         self._flush()
-        self._moved(self._position())
-        code = "B" if leaf.code == "?" else leaf.code
-        if leaf.size == 1 and code == "B":
-            self.code.line(f'buf[p : p + {count}] = block({name}, "B", {count})')
-            self._moved(f"p + {count}")
-            return
-        size = self.code.temp("n")
-        self.code.line(f"if {count}:")
-        if padded:
-            self.code.line(f"    p = pad(buf, p, off, {leaf.size})")
-        self.code.line(f"    {size} = {_times(leaf.size, count)}")
-        self.code.line(f'    pack_into("%ds" % {size}, buf, p, block({name}, "{code}", {count}))')
-        self.code.line(f"    p += {size}")
+        self._moved(f"{function}(buf, {self._position()}, off, {arguments})")
 
     def _many(self, leaf: Many) -> None:
-        items, count = self.code.temp("l"), self.code.temp("n")
+        items = self.code.temp("l")
         self.code.line(f"{items} = {self.code.place(leaf.path)}")
         if leaf.count:
             self._flush()
@@ -286,35 +304,22 @@ class _Writer(_Walker):
             self.code.line(f"    need(len({items}), {leaf.count})")
             self.code.line(f"    need({leaf.count}, len({items}))")
         else:
-            self.code.line(f"{count} = len({items})")
-            if leaf.bound:
-                self.code.line(f"need({leaf.bound}, {count})")
-            self._value(4, "I", count, 4)
-            self._flush()
+            bound = f", {leaf.bound}" if leaf.bound else ""
+            self._call("put_count", f"len({items}){bound}")
             self._at = self._at.aligned(4).moved(4)
-        element = self.code.temp("e")
-        self._loop(leaf, element, f"for {element} in {items}:", "write", "buf, p, off")
+        self._loop(leaf, items, "write", "buf, p, off")
 
     def _value(self, align: int, chunk: str, value: str, size: int) -> None:
         pad = self._at.pad(align)
         if pad is None:
-            self._aligned(align)
+            self._flush()
+            self._moved(f"pad(buf, {self._position()}, off, {align})")
         elif pad:
             self._run.append("x" if pad == 1 else f"{pad}x")
             self._run_size += pad
         self._run.append(chunk)
         self._values.append(value)
         self._run_size += size
-
-    def _aligned(self, align: int) -> None:
-        """Ends the run and zeroes what lies before the next aligned position."""
-        pad = self._at.pad(align)
-        if pad:
-            self._run.append("x" if pad == 1 else f"{pad}x")
-            self._run_size += pad
-        self._flush()
-        if pad is None:
-            self._moved(f"pad(buf, {self._position()}, off, {align})")
 
     def _flush(self) -> None:
         if self._run:
@@ -328,151 +333,167 @@ class _Writer(_Walker):
         self._run, self._values, self._run_size = [], [], 0
 
 
-class _Reader(_Walker):
-    def __init__(self, blank: Blank, shared: Shared) -> None:
-        super().__init__("off", shared)
-        self._blank = blank
+class _Runs(_Walker):
+    """Reading numbers that follow each other: their chunks are gathered, then read at once or one by one."""
+
+    def __init__(self, shared: Shared) -> None:
+        super().__init__(shared)
         self._run: list[tuple[str, str, int]] = []  # struct chunk ("" for padding), target, size
         self._later: list[str] = []
-        self._checked = False  # all bytes are known to be there
-
-    def run(self, found: Sequence[Leaf]) -> list[str]:
-        size = fixed_size(found)
-        if list(found) == [Dummy()]:
-            return ["need(4, n)"]
-        if size is not None:
-            self._checked = True
-            self.code.line(f"need(n, {size})")
-            self._walk(found)
-            self._flush()
-            self.code.line(f"ended(n - {size})")
-        else:
-            self.code.line("e = off + n")
-            self._walk(found)
-            self._flush()
-            self.code.line(f"ended(e - {_bracketed(self._position())})")
-        return self.code.lines
 
     def _leaf(self, leaf: Leaf) -> None:
         match leaf:
             case Scalar():
                 self._value(leaf.size, leaf.code, self.code.place(leaf.path), leaf.size)
             case Block():
-                self._block(leaf)
+                target, size = self.code.place(leaf.path), leaf.size * leaf.count
+                self._value(leaf.size, f"{size}s", target, size)
+                if leaf.code == "?":
+                    self._later.append(f"{target} = [c != 0 for c in {target}]")
+                elif leaf.code != "B":
+                    self._later.append(f'{target} = array("{leaf.code}", {target})')
             case Dummy():
                 self._run.append(("", "", 1))
-            case Text():
-                target = self.code.place(leaf.path)
-                count = self._count(1)
-                if leaf.bound:
-                    self.code.line(f"need({leaf.bound + 1}, {count})")
-                self.code.line(f"{target} = text(buf, {self._position(4)}, {count})")
-                self._moved(f"{self._position(4)} + {count}")
-            case Numbers():
-                self._numbers(leaf)
-            case Many():
-                self._many(leaf)
-
-    def _block(self, leaf: Block) -> None:
-        target, size = self.code.place(leaf.path), leaf.size * leaf.count
-        self._value(leaf.size, f"{size}s", target, size)
-        if leaf.code == "?":
-            self._later.append(f"{target} = [c != 0 for c in {target}]")
-        elif leaf.code != "B":
-            self._later.append(f'{target} = array("{leaf.code}", {target})')
-
-    def _numbers(self, leaf: Numbers) -> None:
-        target = self.code.place(leaf.path)
-        count = self._count(leaf.size)
-        if leaf.bound:
-            self.code.line(f"need({leaf.bound}, {count})")
-        self._moved(self._position(4))
-        size = self.code.temp("n")
-        if leaf.size == 1:
-            size = count
-        else:
-            self.code.line(f"{size} = {_times(leaf.size, count)}")
-        if self._at.aligned(4).moved(4).pad(leaf.size) != 0:
-            self.code.line(f"if {count}:")
-            self.code.line(f"    p += off - p & {leaf.size - 1}")
-            self.code.line(f"    need(e - p, {size})")
-        part = f"bytes(memoryview(buf)[p : p + {size}])"
-        if leaf.code == "?":
-            part = f"[c != 0 for c in {part}]"
-        elif leaf.code != "B":
-            part = f'array("{leaf.code}", {part})'
-        self.code.line(f"{target} = {part}")
-        self._moved(f"p + {size}")
-
-    def _many(self, leaf: Many) -> None:
-        target = self.code.place(leaf.path)
-        if leaf.count:
-            self._flush()
-            count = str(leaf.count)
-        else:
-            count = self._count(least_size(leaf.body))
-            if leaf.bound:
-                self.code.line(f"need({leaf.bound}, {count})")
-            self._const += 4
-            self._at = self._at.aligned(4).moved(4)
-        items, element = self.code.temp("l"), self.code.temp("e")
-        self.code.line(f"{items} = []")
-        start = self._blank(leaf.type_name, element) if leaf.type_name else []
-        self._loop(leaf, element, f"for _ in range({count}):", "read", "buf, p, off, e", start)
-        self.code.indent += 1
-        self.code.line(f"{items}.append({element})")
-        self.code.indent -= 1
-        self.code.line(f"{target} = {items}")
-
-    def _count(self, least: int) -> str:
-        """Reads and checks a count at the present position, which stays."""
-        self._flush()
-        pad = self._at.pad(4)
-        if pad is None:
-            self._moved(f"{self._position()} + ({self._offset()} & 3)")
-        else:
-            self._const += pad
-        name = self.code.temp("n")
-        self.code.line(f"{name} = count(buf, {self._position()}, e, {least})")
-        return name
-
-    def _offset(self) -> str:
-        """What padding to the next aligned position takes, before it is masked."""
-        return f"off - {_bracketed(self._position())}"
 
     def _value(self, align: int, chunk: str, target: str, size: int) -> None:
         pad = self._at.pad(align)
-        if pad is None:
-            self._flush()
-            self._moved(f"{self._position()} + ({self._offset()} & {align - 1})")
-        elif pad:
+        if pad:
             self._run.append(("", "", pad))
         self._run.append((chunk, target, size))
 
-    def _flush(self) -> None:
-        size = sum(width for _, _, width in self._run)
-        if size and not self._checked:
-            self.code.line(f"need(e - {_bracketed(self._position())}, {size})")
-        if any(chunk[-1:] in ("f", "d", "s") for chunk, _, _ in self._run):
-            self._unpack()
+    def _size(self) -> int:
+        return sum(width for _, _, width in self._run)
+
+    def _get(self, base: str, unpack: bool) -> None:
+        """Reads the run that begins at ``base``."""
+        if unpack or any(chunk[-1:] in ("f", "d", "s") for chunk, _, _ in self._run):
+            self._unpack(base)
         else:
             at = 0
             for chunk, target, width in self._run:
                 if chunk:
-                    self.code.line(f"{target} = {_integer(chunk, width, self._position(at))}")
+                    self.code.line(f"{target} = {_integer(chunk, width, f'{base} + {at}' if at else base)}")
                 at += width
         for line in self._later:
             self.code.line(line)
-        self._const += size
         self._run, self._later = [], []
 
-    def _unpack(self) -> None:
+    def _unpack(self, base: str) -> None:
         chunks = [chunk.replace("?", "B") or f"{width}x" for chunk, _, width in self._run]
         targets = [target for chunk, target, _ in self._run if chunk]
         bools = [f"{target} = {target} != 0" for chunk, target, _ in self._run if chunk == "?"]
         head = ", ".join(targets) + ("," if len(targets) == 1 else "")
-        self.code.line(f'{head} = unpack_from("{format_text("<", chunks)}", buf, {self._position()})')
+        self.code.line(f'{head} = unpack_from("{format_text("<", chunks)}", buf, {base})')
         self._later = bools + self._later
+
+
+class _FixedReader(_Runs):
+    """Reads a message of fixed size, whose bytes are counted once."""
+
+    def run(self, found: Sequence[Leaf], size: int) -> list[str]:
+        self.code.line(f"need(n, {size})")
+        self._walk(found)
+        self._get("off", unpack=False)
+        self.code.line(f"ended(n - {size})")
+        return self.code.lines
+
+
+class _Reader(_Runs):
+    """Reads any message through ``at``, which knows position and end."""
+
+    def __init__(self, blank: Blank, shared: Shared) -> None:
+        super().__init__(shared)
+        self._blank = blank
+        self._align = 1  # of the run
+
+    def run(self, found: Sequence[Leaf]) -> list[str]:
+        self.code.line("at = [buf, off, off + n, off]")
+        self._walk(found)
+        self._flush()
+        self.code.line("finish(at)")
+        return self.code.lines
+
+    def element(self, found: Sequence[Leaf]) -> list[str]:
+        """The body of a function that reads one message ``m``, of whose alignment nothing is known."""
+        self.code = Code("m")
+        self._at = At(1, 0)
+        self._walk(found)
+        self._flush()
+        return self.code.lines
+
+    def _leaf(self, leaf: Leaf) -> None:
+        match leaf:
+            case Text():
+                self._call(leaf.path, "text", str(leaf.bound) if leaf.bound else "")
+            case Numbers():
+                bound = f", {leaf.bound}" if leaf.bound else ""
+                self._call(leaf.path, "numbers", f'"{leaf.code}", {leaf.size}{bound}')
+            case Many():
+                self._flush()
+                self._many(leaf)
+            case Group():
+                self._flush()
+                function = self._shared.function("read", leaf.type_name)
+                self.code.line(f"{function}({self.code.place(leaf.path)}, buf, at)")
+            case _:
+                super()._leaf(leaf)
+
+    def _call(self, path: Path, function: str, arguments: str) -> None:
+        self._flush()
+        more = f", {arguments}" if arguments else ""
+        self.code.line(f"{self.code.place(path)} = {function}(at{more})")
+
+    def _many(self, leaf: Many) -> None:
+        target, items, element = self.code.place(leaf.path), self.code.temp("l"), self.code.temp("e")
+        bound = f", {leaf.bound}" if leaf.bound else ""
+        count = str(leaf.count) if leaf.count else f"count(at, {least_size(leaf.body)}{bound})"
+        self.code.line(f"{items} = []")
+        self.code.line(f"for _ in range({count}):")
+        saved = self.code.enter(element)
+        for line in self._blank(leaf.type_name, element) if leaf.type_name else ():
+            self.code.line(line)
+        self._at = loop(leaf.body, self._at if leaf.count else self._at.aligned(4).moved(4))
+        if leaf.type_name in self._shared:
+            self.code.line(f"{self._shared.function('read', leaf.type_name)}({element}, buf, at)")
+        else:
+            self._walk(leaf.body)
+            self._flush()
+        self.code.line(f"{items}.append({element})")
+        self.code.leave(saved)
+        self.code.line(f"{target} = {items}")
+
+    def _value(self, align: int, chunk: str, target: str, size: int) -> None:
+        if self._at.pad(align) is None:
+            self._flush()
+        if self._run:
+            super()._value(align, chunk, target, size)
+        else:
+            self._align = align
+            self._run.append((chunk, target, size))
+
+    def _flush(self) -> None:
+        if not self._run:
+            return
+        place = f"part(at, {self._align}, {self._size()})"
+        self._align = 1
+        values = [width for chunk, _, width in self._run if chunk]
+        if not values:
+            self.code.line(place)
+            self._run = []
+        elif len(self._run) == 1 and not self._later:
+            self._get(place, unpack=False)
+        else:
+            self.code.line(f"p = {place}")
+            self._get("p", unpack=max(values) > 1)
+
+
+def _stride(body: Sequence[Leaf]) -> tuple[int, int] | None:
+    """Alignment and size of elements that follow each other without padding, None where they do not."""
+    size = fixed_size(body)
+    aligns = [leaf.size for leaf in body if isinstance(leaf, Scalar | Block)]
+    if size is None or len(aligns) < len(body) or max(aligns) > aligns[0] or size % aligns[0]:
+        return None
+    return aligns[0], size
 
 
 def _integer(code: str, size: int, at: str) -> str:
@@ -483,17 +504,6 @@ def _integer(code: str, size: int, at: str) -> str:
     return f"integer(buf, {at}, {size}, {int(code.islower())})"
 
 
-def _bytes_of(code: Code, leaf: Text, memos: Memos | None) -> str:
-    """The expression of a string's bytes: kept with the message, or made anew for an element of a sequence."""
-    value = code.place(leaf.path)
-    if memos is not None and code.indent == 0:  # outside loops
-        return f"encoded({value}, self.{memos.name(leaf.path)})"
-    return f"({value}.encode() if isinstance({value}, str) else {value})"
-
-
-def _times(size: int, count: str) -> str:
-    return count if size == 1 else f"{size} * {count}"
-
-
-def _bracketed(position: str) -> str:
-    return f"({position})" if "+" in position else position
+def _memo_arguments(code: Code, leaf: Text, memo: Memo | None) -> str:
+    """A string outside loops is encoded once and kept with the message, an element's each time."""
+    return memo.arguments(leaf.path) if memo is not None and code.indent == 0 else ""

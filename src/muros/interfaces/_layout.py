@@ -8,7 +8,7 @@ and computes it at run time only where it must.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -71,11 +71,20 @@ class Many:
 
 
 @dataclass(frozen=True, slots=True)
+class Group:
+    """A nested message that is kept together, so that code of its own can deal with it."""
+
+    path: Path
+    type_name: str
+    body: tuple[Leaf, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Dummy:
     """The one byte of a message without fields."""
 
 
-Leaf = Scalar | Block | Numbers | Text | Many | Dummy
+Leaf = Scalar | Block | Numbers | Text | Many | Group | Dummy
 
 
 class At(NamedTuple):
@@ -113,22 +122,31 @@ class At(NamedTuple):
 START = At(MAX_ALIGN, 0)
 
 
-def leaves(message: Message, find: Callable[[str], Message], path: Path = ()) -> tuple[Leaf, ...]:
-    """The leaves of a message in wire order, nested messages dissolved; ``find`` gives a message by full name."""
+def leaves(
+    message: Message, find: Callable[[str], Message], path: Path = (), kept: Container[str] = ()
+) -> tuple[Leaf, ...]:
+    """The leaves of a message in wire order; ``find`` gives a message by full name.
+
+    Nested messages are dissolved, but for the types in ``kept``, which become groups.
+    """
     if not message.fields:
         return (Dummy(),)
     found: list[Leaf] = []
     for field in message.fields:
-        found += _field((*path, attribute(field.name)), field.type, find)
+        found += _field((*path, attribute(field.name)), field.type, find, kept)
     return tuple(found)
 
 
-def _field(path: Path, kind: FieldType, find: Callable[[str], Message]) -> Sequence[Leaf]:
+def _field(
+    path: Path, kind: FieldType, find: Callable[[str], Message], kept: Container[str]
+) -> Sequence[Leaf]:
     if kind.nested:
         nested = find(kind.base)
         if kind.kind is Kind.ONE:
-            return leaves(nested, find, path)
-        body = leaves(nested, find)
+            if kind.base in kept:
+                return (Group(path, kind.base, leaves(nested, find, (), kept)),)
+            return leaves(nested, find, path, kept)
+        body = leaves(nested, find, (), kept)
     else:
         primitive = PRIMITIVES[kind.base]
         if primitive.size:
@@ -162,6 +180,10 @@ def after(leaf: Leaf, at: At) -> At:
             return counted.aligned(size).strided(size).meet(counted)
         case Many(count=count, body=body):
             return loop(body, at if count else at.aligned(4).moved(4))
+        case Group(body=body):
+            for inner in body:
+                at = after(inner, at)
+            return at
 
 
 def loop(body: Sequence[Leaf], at: At) -> At:
@@ -187,6 +209,11 @@ def fixed_size(found: Sequence[Leaf], start: int = 0) -> int | None:
                 size += -size % width + width * count
             case Dummy():
                 size += 1
+            case Group(body=body):
+                end = fixed_size(body, size)
+                if end is None:
+                    return None
+                size = end
             case Many(count=count, body=body) if 0 < count <= _UNROLLED:
                 for _ in range(count):
                     end = fixed_size(body, size)
@@ -209,6 +236,8 @@ def least_size(found: Sequence[Leaf]) -> int:
                 size += width * count
             case Many(count=count, body=body) if count:
                 size += count * least_size(body)
+            case Group(body=body):
+                size += least_size(body)
             case Dummy():
                 size += 1
             case _:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from muros.interfaces import _model as model
 from muros.interfaces._api import registry as default_registry
-from muros.interfaces._board_code import Memos, Shared, read_lines, size_lines, write_lines
+from muros.interfaces._board_code import Memo, Shared, read_lines, size_lines, write_lines
 from muros.interfaces._layout import Leaf, Many, Text, leaves
 from muros.interfaces._model import (
     PRIMITIVES,
@@ -30,7 +30,11 @@ from muros.interfaces._model import (
 from muros.interfaces._names import split_type
 from muros.interfaces._registry import Registry
 
-_HELPERS = ("Fields", "block", "count", "encoded", "ended", "integer", "need", "pad", "put_text", "text")
+_HELPERS = {
+    "muros.cdr": ("Fields", "block", "ended", "integer", "need"),
+    "muros.cdr_texts": ("count", "finish", "pad", "part", "put_count", "put_text", "text", "text_size"),
+    "muros.cdr_lists": ("list_size", "numbers", "put_numbers"),
+}
 
 _PACKAGE = """\
 def __getattr__(name):
@@ -158,95 +162,129 @@ class _Work:
             raise InterfaceError(f"{message.name}: wstring is not supported on boards; use string")
 
     def _source(self, path: str, messages: list[Message]) -> str:
-        functions: dict[str, None] = {}  # in order, each once
+        functions: dict[str, list[str]] = {}  # name -> lines
         classes = [self._class(message, functions) for message in messages]
-        body = "\n\n".join([*functions, *classes, *self._tails.get(path, [])])
+        body = "\n\n".join([*_used(functions, classes), *classes, *self._tails.get(path, [])])
         head = _imports(body)
         hidden = {name for message in messages for name in _hidden(message)}
         head += [f"_{name} = {name}" for name in sorted(hidden) if f"_{name}(" in body]
         return "\n".join([*head, "", "", body] if head else [body])
 
-    def _class(self, message: Message, functions: dict[str, None]) -> str:
-        found = leaves(message, self.registry.message)
-        memos = Memos()
+    def _class(self, message: Message, functions: dict[str, list[str]]) -> str:
+        shared = Shared(message, self.registry.message)
+        found = shared.leaves(message)
+        memo = Memo(found)
+        values = _Values(self.registry, shared)
         methods: list[str] = []
-        if message.name in self._full:
-            shared = Shared(found, self._skeleton)
-            methods += ["    def size(self):", *_indented(size_lines(found, memos, shared))]
-            methods += ["    def write(self, buf, off):", *_indented(write_lines(found, memos, shared))]
+        full = message.name in self._full
+        if full:
+            methods += ["    def size(self):", *_indented(size_lines(found, memo, shared))]
+            methods += ["    def write(self, buf, off):", *_indented(write_lines(found, memo, shared))]
             methods += [
                 "    def read(self, buf, off, n):",
-                *_indented(read_lines(found, self._skeleton, shared)),
+                *_indented(read_lines(found, values.blank, shared)),
             ]
-            if shared.lines():
-                functions["\n".join(shared.lines()) + "\n"] = None
+        for name in shared:
+            functions |= values.maker(name) | shared.functions(name, values.blank)
         lines = [f"class {_short(message.name)}:", f'    TYPE = "{message.name}"']
         lines += [f"    {attribute(c.name)} = {_literal(c.value)}" for c in message.constants]
         if message.fields:
-            lines += self._init(message, memos)
+            lines += self._init(message, values, len(memo.paths) if full else 0)
         return "\n".join(lines + methods) + "\n"
 
-    def _init(self, message: Message, memos: Memos) -> list[str]:
+    def _init(self, message: Message, values: _Values, texts: int) -> list[str]:
         arguments, lines = ["self"], []
         hidden = _hidden(message)
         for field in message.fields:
             name = attribute(field.name)
             if field.type.nested or _made(field):
                 arguments.append(f"{name}=None")
-                filled = [f"if {name} is None:", *(f"    {line}" for line in self._filled(name, field))]
+                filled = [f"if {name} is None:", *(f"    {line}" for line in values.filled(name, field))]
                 lines += [_unshadowed(line, hidden) for line in filled]
             else:
                 arguments.append(f"{name}={_literal(_plain(field))}")
             lines.append(f"self.{name} = {name}")
-        lines += [f'self.{memo} = ["", b""]' for memo in memos.names()]
+        if texts:
+            lines.append('self._memo = ["", b""]' + (f" * {texts}" if texts > 1 else ""))
         return [f"    def __init__({', '.join(arguments)}):", *_indented(lines)]
 
-    def _filled(self, target: str, field: Field, depth: int = 0) -> list[str]:
+
+class _Values:
+    """Code that makes nested messages: with their defaults for constructors, or blank for what is about to be read."""
+
+    def __init__(self, registry: Registry, shared: Shared) -> None:
+        self._find = registry.message
+        self._shared = shared
+
+    def filled(self, target: str, field: Field, depth: int = 0) -> list[str]:
         """Lines that put the default of a field into ``target``."""
         if not field.type.nested:
             return [f"{target} = {_made(field) or _literal(_plain(field))}"]
-        nested = self.registry.message(field.type.base)
+        name = field.type.base
         if field.type.kind is Kind.ONE:
+            if name in self._shared:
+                return [f"{target} = {self._shared.function('new', name)}()"]
             variable = target if target.isidentifier() else f"v{depth}"
-            lines = [f"{variable} = Fields()"]
-            lines += self._values(variable, nested, depth)
+            lines = self._message(variable, self._find(name), depth)
             return lines if variable == target else [*lines, f"{target} = {variable}"]
         if field.type.kind is not Kind.ARRAY:
             return [f"{target} = []"]
         items, element = f"l{depth}", f"e{depth}"
-        inner = [
-            f"{element} = Fields()",
-            *self._values(element, nested, depth + 1),
-            f"{items}.append({element})",
-        ]
+        if name in self._shared:
+            inner = [f"{items}.append({self._shared.function('new', name)}())"]
+        else:
+            inner = [*self._message(element, self._find(name), depth + 1), f"{items}.append({element})"]
         loop = [f"for _ in range({field.type.count}):", *(f"    {line}" for line in inner)]
         return [f"{items} = []", *loop, f"{target} = {items}"]
 
-    def _values(self, variable: str, message: Message, depth: int) -> list[str]:
-        """Lines that set all attributes of a nested message; equal defaults in a row share a line."""
-        lines: list[str] = []
-        shared = ""
+    def blank(self, name: str, variable: str, depth: int = 0) -> list[str]:
+        """Lines that make a nested message with the messages in it; only shared types get values, too."""
+        if name in self._shared:
+            return [f"{variable} = {self._shared.function('new', name)}()"]
+        lines = [f"{variable} = Fields()"]
+        for field in self._find(name).fields:
+            if field.type.nested and field.type.kind is Kind.ONE:
+                target = f"{variable}.{attribute(field.name)}"
+                if field.type.base in self._shared:
+                    lines += self.blank(field.type.base, target)
+                    continue
+                inner = f"f{depth}"
+                lines += [*self.blank(field.type.base, inner, depth + 1), f"{target} = {inner}"]
+        return lines
+
+    def maker(self, name: str) -> dict[str, list[str]]:
+        """The function that makes a shared type: name -> lines."""
+        function = self._shared.function("new", name)
+        lines = self._message("m", self._find(name), 0)
+        return {function: [f"def {function}():", *(f"    {line}" for line in lines), "    return m"]}
+
+    def _message(self, variable: str, message: Message, depth: int) -> list[str]:
+        """Lines that make a message with its values; equal defaults in a row share a line."""
+        lines = [f"{variable} = Fields()"]
+        previous = ""
         for field in message.fields:
             target = f"{variable}.{attribute(field.name)}"
             if field.type.nested or _made(field):
-                lines += self._filled(target, field, depth + 1)
-                shared = ""
-            elif (value := _literal(_plain(field))) == shared:
+                lines += self.filled(target, field, depth + 1)
+                previous = ""
+            elif (value := _literal(_plain(field))) == previous:
                 lines[-1] = f"{target} = {lines[-1]}"
             else:
                 lines.append(f"{target} = {value}")
-                shared = value
+                previous = value
         return lines
 
-    def _skeleton(self, name: str, variable: str, depth: int = 0) -> list[str]:
-        """Lines that make a nested message with the messages in it, but no values."""
-        lines = [f"{variable} = Fields()"]
-        for field in self.registry.message(name).fields:
-            if field.type.nested and field.type.kind is Kind.ONE:
-                inner = f"f{depth}"
-                lines += self._skeleton(field.type.base, inner, depth + 1)
-                lines.append(f"{variable}.{attribute(field.name)} = {inner}")
-        return lines
+
+def _used(functions: dict[str, list[str]], classes: list[str]) -> list[str]:
+    """The text of the functions that classes call, or that such functions call."""
+    text = "".join(classes)
+    used: dict[str, str] = {}
+    while more := {
+        name: lines for name, lines in functions.items() if name not in used and f"{name}(" in text
+    }:
+        used |= {name: "\n".join(lines) + "\n" for name, lines in more.items()}
+        text = "".join(used.values())
+    return ["\n".join(line.rstrip("\n") for line in used.values()) + "\n"] if used else []
 
 
 def _imports(body: str) -> list[str]:
@@ -256,9 +294,10 @@ def _imports(body: str) -> list[str]:
     packers = [name for name in ("pack_into", "unpack_from") if f"{name}(" in body]
     if packers:
         lines.append(f"from struct import {', '.join(packers)}")
-    helpers = [name for name in _HELPERS if re.search(rf"(?<!\w|\.)_?{name}\(", body)]
-    if helpers:
-        lines.append(f"from muros.cdr import {', '.join(helpers)}")
+    for module, names in _HELPERS.items():
+        used = [name for name in names if re.search(rf"(?<!\w|\.)_?{name}\(", body)]
+        if used:
+            lines.append(f"from {module} import {', '.join(used)}")
     return lines
 
 

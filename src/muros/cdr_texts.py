@@ -1,0 +1,106 @@
+"""CDR for boards: strings, and the position in messages whose size differs; see :mod:`muros.cdr`.
+
+Reading, ``at`` is the list ``[buffer, first byte, end, position]``: alignment counts from the first byte, and each read
+moves the position. Writing, the position is passed and returned, since publishing leaves the heap alone. Values are
+aligned here, so that generated code, of which there is much, stays short.
+"""
+
+from struct import pack_into
+
+from muros.cdr import CdrError, ended, integer, need
+from muros.compat import const
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from typing import Any
+
+
+def part(at: "list[Any]", align: int, size: int) -> int:
+    """The offset of the next ``size`` bytes, which begin at a multiple of ``align``; the position is behind them."""
+    p: int = at[3]
+    p += at[1] - p & align - 1
+    need(at[2] - p, size)
+    at[3] = p + size
+    return p
+
+
+def finish(at: "list[Any]") -> None:
+    """Raises CdrError unless the body ends here."""
+    ended(at[2] - at[3])
+
+
+def count(at: "list[Any]", least: int, bound: int = 0) -> int:
+    """The next count, of elements that take at least ``least`` bytes each, checked against bound and end."""
+    n = integer(at[0], part(at, 4, 4), 4, 0)
+    if bound:
+        need(bound, n)
+    need(at[2] - at[3], n * least)
+    return n
+
+
+def text(at: "list[Any]", bound: int = 0) -> str:
+    """The next string. Allocates the string and a view."""
+    n = count(at, 1, bound and bound + 1)
+    if n == 0:
+        return ""
+    p = part(at, 1, n)
+    try:
+        if at[0][at[3] - 1] == 0:
+            return str(memoryview(at[0])[p : p + n - 1], "utf-8")
+    except ValueError:
+        pass
+    raise CdrError("bad string")
+
+
+def encoded(value: "str | bytes | bytearray", memo: "list[Any] | None", i: int) -> "bytes | bytearray":
+    """The bytes of a string; a str is encoded once and kept in ``memo``, from ``i`` on, until it is replaced."""
+    if not isinstance(value, str):
+        return value
+    if memo is None:
+        return value.encode()
+    if value is not memo[i]:
+        memo[i + 1] = value.encode()
+        memo[i] = value
+    return memo[i + 1]  # type: ignore[no-any-return]
+
+
+def text_size(p: int, value: "str | bytes | bytearray", memo: "list[Any] | None" = None, i: int = 0) -> int:
+    """The size of a message up to and with a string, ``p`` without it."""
+    return (p + 3 & -4) + 5 + len(encoded(value, memo, i))
+
+
+def put_text(
+    buf: "bytearray",
+    p: int,
+    off: int,
+    value: "str | bytes | bytearray",
+    memo: "list[Any] | None" = None,
+    i: int = 0,
+    bound: int = 0,
+) -> int:
+    """Writes a string: its count, its bytes, NUL; returns the offset behind it."""
+    value = encoded(value, memo, i)
+    n = len(value)
+    if bound:
+        need(bound, n)
+    p = put_count(buf, p, off, n + 1)
+    buf[p : p + n] = value
+    buf[p + n] = 0
+    return p + n + 1
+
+
+def put_count(buf: "bytearray", p: int, off: int, n: int, bound: int = 0) -> int:
+    """Writes the count of a string or sequence; returns the offset behind it. Raises CdrError beyond the bound."""
+    if bound:
+        need(bound, n)
+    p = pad(buf, p, off, 4)
+    pack_into("<I", buf, p, n)
+    return p + 4
+
+
+def pad(buf: "bytearray", p: int, off: int, align: int) -> int:
+    """Zeroes up to the next multiple of ``align`` from ``off``; returns its offset."""
+    while p - off & align - 1:
+        buf[p] = 0
+        p += 1
+    return p
