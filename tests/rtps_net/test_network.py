@@ -542,6 +542,23 @@ def test_failing_to_open_leaves_nothing_behind(
     second.close()
 
 
+def test_a_loop_that_was_closed_may_be_followed_by_another(
+    settings: NetworkSettings, loop: asyncio.AbstractEventLoop
+) -> None:
+    first = asyncio.new_event_loop()
+    network = Network(settings)
+    network.open(first)
+    first.run_until_complete(asyncio.sleep(0))
+    first.close()
+    network.open(loop)
+    core = core_of(network)
+    port = core.addresses.metatraffic_unicast[0].port
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.sendto(b"hello", ("127.0.0.1", port))
+        spin(loop, lambda: core.received)
+    network.close()
+
+
 def test_opening_twice_and_after_the_end(settings: NetworkSettings, loop: asyncio.AbstractEventLoop) -> None:
     other = asyncio.new_event_loop()
     network = Network(settings)

@@ -119,13 +119,16 @@ class Network:
     def open(self, loop: asyncio.AbstractEventLoop) -> None:
         """Binds the sockets and serves them on `loop` from now on; `NetworkError` when that cannot be.
 
-        What was made in the core before is announced now. Opening again on the same loop does nothing.
+        What was made in the core before is announced now. Opening again on the same loop does nothing; when that
+        was closed, another one may follow, and the ports may be other ones then.
         """
         self._check()
         if self._closed:
             raise NetworkError(self._who, "it is closed", "Open a new one.")
         if self._loop is loop:
             return
+        if self._loop is not None and self._loop.is_closed():
+            self._release()
         if self._loop is not None:
             raise NetworkError(self._who, "it is served by another loop", "Open another one for this loop.")
         if self.settings.range is not Range.OFF:
@@ -168,6 +171,10 @@ class Network:
         if self._process != os.getpid():
             return
         self.core.close(self.clock())
+        self._release()
+
+    def _release(self) -> None:
+        """Lets go of the loop and the sockets."""
         if self._loop is None:
             return
         if self._timer is not None:
@@ -184,6 +191,9 @@ class Network:
         for sock in self._sockets():
             sock.close()
         self._pair = self._multicast = self._loop = None
+        self._interfaces = ()
+        self._joined.clear()
+        self._overflown.clear()
 
     @property
     def _who(self) -> str:
