@@ -11,7 +11,7 @@ from muros.rclc import Executor, RclError
 from muros.rclc.hosts import Context
 from muros.space import CDR_BE, Durability, History, Reliability, Space, Topic, open_space
 from muros.space import Qos as SpaceQos
-from muros.space.rclc import PROBLEMS, SpaceMiddleware
+from muros.space.rclc import ENCODING, NETWORK, NOT_SPUN, OTHER, PROBLEMS, SpaceMiddleware
 
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32, String
@@ -243,7 +243,7 @@ def test_what_is_about_nobody_is_told_to_those_who_listen_and_printed_once(
     space.findings.report("new-code", who="the network", what="it is mute", now=1.0)
     for context in contexts:
         Executor(context).spin_some()
-    said = [(42, "the network: it is deaf. Mend it."), (20, "the network: it is mute.")]
+    said = [(NETWORK, "the network: it is deaf. Mend it."), (OTHER, "the network: it is mute.")]
     assert problems == said * 2
     assert capsys.readouterr().err == "".join(f"muros: {text}\n" for _, text in said)
     for context in contexts:
@@ -252,8 +252,9 @@ def test_what_is_about_nobody_is_told_to_those_who_listen_and_printed_once(
 
 
 def test_codes_are_told_apart() -> None:
-    assert len(set(PROBLEMS.values())) == len(PROBLEMS)
-    assert min(PROBLEMS.values()) > 20
+    codes = [ENCODING, NETWORK, NOT_SPUN, OTHER, *PROBLEMS.values()]
+    assert len(set(codes)) == len(codes)
+    assert min(codes) > 12, "of sessions and of rclc"
 
 
 def test_a_problem_does_not_wait_for_the_end_of_a_pass(space: Space) -> None:
@@ -354,7 +355,7 @@ def test_publishing_without_spinning_is_told(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("muros.space.rclc._middleware.NOT_SPUN_AFTER", -1.0)
     assert publisher.publish(Int32())
     assert publisher.publish(Int32())
-    assert [code for code, _ in problems] == [18]
+    assert [code for code, _ in problems] == [NOT_SPUN]
     assert problems[0][1].startswith("rt/value is published, but nobody spins this context")
     context.close()
 
@@ -375,7 +376,7 @@ def test_foreign_representations(space: Space) -> None:
     for _ in range(4):
         Executor(context).spin_some()
     assert got == ["big", "little"]
-    assert [code for code, _ in problems] == [19, 19]
+    assert [code for code, _ in problems] == [ENCODING, ENCODING]
     assert "its representation 0x0007 is not read here, only classic CDR" in problems[0][1]
     context.close()
 

@@ -11,6 +11,6 @@ docs/write-a-node.md.
 
 from muros.space.rclc._middleware import SpaceMiddleware
 from muros.space.rclc._opening import open_way
-from muros.space.rclc._problems import PROBLEMS
+from muros.space.rclc._problems import ENCODING, NETWORK, NOT_SPUN, OTHER, PROBLEMS
 
-__all__ = ["PROBLEMS", "SpaceMiddleware", "open_way"]
+__all__ = ["ENCODING", "NETWORK", "NOT_SPUN", "OTHER", "PROBLEMS", "SpaceMiddleware", "open_way"]

@@ -13,6 +13,7 @@ from muros.rclc.errors import RclError
 from muros.space import _door
 from muros.space._qos import Qos
 from muros.space._values import CDR_BE, CDR_LE, Sample, Service, Topic
+from muros.space.rclc._problems import ENCODING
 
 if TYPE_CHECKING:
     from muros.client._types import Message, OnData, Outgoing
@@ -23,9 +24,6 @@ __all__ = ["LONGEST_NAME", "Node", "Publisher", "Reader", "Receiver", "Replier",
 
 LONGEST_NAME: Final = 255
 """Longest name of a topic, type or node, in characters: that of ROS 2's middlewares."""
-
-ENCODING: Final = 19
-"""The code with which `on_problem` is told of samples that nobody here can read."""
 
 _AT_ONCE: Final = 64
 """Samples that one reader hands on before the others have their turn."""

@@ -26,7 +26,7 @@ from muros.space.rclc._entities import (
     Replier,
     Requester,
 )
-from muros.space.rclc._problems import code_of, line_of
+from muros.space.rclc._problems import NOT_SPUN, code_of, line_of
 
 if TYPE_CHECKING:
     from muros.client._types import OnData
@@ -35,9 +35,6 @@ if TYPE_CHECKING:
     from muros.space.rclc._ground import Ground
 
 __all__ = ["SpaceMiddleware"]
-
-NOT_SPUN: Final = 18
-"""The code with which `on_problem` is told that nobody spins the context."""
 
 NOT_SPUN_AFTER: Final = 3.0
 """Seconds in which somebody should have."""

@@ -1,4 +1,7 @@
-"""What a space reports, as the problems of a context: a number that programs may test for, and one line of text."""
+"""What a space reports, as the problems of a context: a number that programs may test for, and one line of text.
+
+Numbers below 18 are told of sessions with agents, and by rclc itself.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,19 @@ from typing import Final
 
 from muros.findings import Finding
 
-__all__ = ["OTHER", "PROBLEMS", "code_of", "line_of"]
+__all__ = ["ENCODING", "NETWORK", "NOT_SPUN", "OTHER", "PROBLEMS", "code_of", "line_of"]
+
+NOT_SPUN: Final = 18
+"""A context is published in, but nobody spins it."""
+
+ENCODING: Final = 19
+"""A sample came that nobody here can read."""
 
 OTHER: Final = 20
-"""The code of findings that are none of `PROBLEMS`."""
+"""The space reports something that has no number of its own."""
+
+NETWORK: Final = 40
+"""The network, or somebody on it, is not as it should be; these findings have codes that begin with ``dds-``."""
 
 PROBLEMS: Final = {
     "qos-mismatch": 21,
@@ -30,21 +42,17 @@ PROBLEMS: Final = {
     "samples-lost": 36,
     "reader-stalled": 37,
     "sample-unreadable": 38,
-    "mixed-distros": 39,
-    "discovery-info-unreadable": 40,
-    "dds-no-interface": 41,
-    "dds-no-multicast": 42,
-    "dds-interface-missing": 43,
-    "dds-peer-unknown": 44,
-    "dds-receive-buffer-small": 45,
-    "dds-receive-buffer-full": 46,
-    "dds-send-queue-full": 47,
+    "liveliness-lost": 39,
+    "writer-silent": 41,
+    "mixed-distros": 42,
 }
-"""Codes of `Context.on_problem` by the code of the finding. Those below 20 are told of sessions and by rclc itself."""
+"""The numbers of what is about nodes, topics and services, by the code of the finding; see docs/space.md."""
 
 
 def code_of(finding: Finding) -> int:
-    """The code that `on_problem` is given."""
+    """The number that `on_problem` is given."""
+    if finding.code.startswith("dds-"):
+        return NETWORK
     return PROBLEMS.get(finding.code, OTHER)
 
 
