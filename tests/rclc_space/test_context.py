@@ -92,7 +92,6 @@ def test_a_space_that_is_given_stays_open(space: Space) -> None:
     assert not space.closed
 
 
-@pytest.mark.parametrize("url", ["local:"])
 def test_contexts_may_come_again_to_a_space_that_is_given(space: Space) -> None:
     Context(space).close()
     again = Context(space, domain_id=3)
