@@ -127,7 +127,7 @@ def test_service_call_repeats() -> None:
         ("/silent --timeout 0.05", "no answer from /silent within 0.05 s"),
         ("/silent '{c: 1}'", "example_interfaces/srv/AddTwoInts_Request has no field 'c' (it has a, b)"),
         ("/silent std_msgs/msg/String", "std_msgs/msg/String is no service"),
-        ("/silent my_srvs/srv/Nothing", "unknown type 'my_srvs/srv/Nothing': no package 'my_srvs'"),
+        ("/silent my_srvs/srv/Nothing", "unknown type 'my_srvs/srv/Nothing': say --types FOLDER, "),
         ("/silent a b c", "too many words: put the values in one, as in '{a: 1, b: 2}'"),
     ],
 )

@@ -402,7 +402,10 @@ def test_pub_from_a_file_publishes_its_documents_in_turn(tmp_path_factory: pytes
             "/x geometry_msgs/msg/Twist 5",
             "the values: geometry_msgs/msg/Twist needs its fields by name, as in ",
         ),
-        ("/x my_own_msgs/msg/A", "unknown type 'my_own_msgs/msg/A': no package 'my_own_msgs'"),
+        (
+            "/x my_own_msgs/msg/A",
+            "unknown type 'my_own_msgs/msg/A': say --types FOLDER, where FOLDER holds my_own_msgs/msg/A.msg",
+        ),
         (
             "/x std_msgs/msg/Int8 1 --yaml-file x",
             "give the values either as words, by --stdin or by --yaml-file",

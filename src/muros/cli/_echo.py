@@ -7,19 +7,23 @@ fit is told of. A type that nobody has told us about is shown as hex.
 from __future__ import annotations
 
 import argparse
+import asyncio
 import time
 from collections.abc import Callable
 from typing import Any
 
 from muros import interfaces
 from muros.cli._learn import make_known
-from muros.cli._names import full_name, learn_types, message_class, ros_topics
+from muros.cli._names import full_name, learn_types, message_class, node_name, ros_topics
 from muros.cli._qos import chosen_qos, fitted_qos, has_choice
 from muros.cli._tool import CommandError, Tool
 from muros.cli._values import Look, dump, hex_dump, pick, to_csv, to_yaml
 from muros.space import CDR_BE, CDR_LE, Endpoint, GraphEvent, Incompatible, Qos, Sample, Topic
 
 __all__ = ["echo", "expression", "reader_qos", "type_to_read"]
+
+NAME_TIME = 0.5
+"""Seconds after which the node of a new endpoint is known."""
 
 DEPTH = 1000
 """Samples a reader keeps: a burst is printed whole, however long the terminal takes."""
@@ -100,17 +104,23 @@ def reader_qos(tool: Tool, name: str, arguments: argparse.Namespace) -> Qos:
 
 def tell_of_mismatches(tool: Tool, gid: bytes) -> None:
     """Tell of everybody, now and later, whose QoS does not fit that of our endpoint."""
+    loop = asyncio.get_running_loop()
 
-    def tell(event: GraphEvent) -> None:
+    def tell(other: bytes, reasons: tuple[str, ...]) -> None:
+        endpoint = tool.graph.endpoint(other)
+        owner = "somebody who has gone" if endpoint is None else node_name(endpoint.participant)
+        tool.say(f"{owner} does not match: {'; '.join(reasons)}; choose with --qos-...")
+
+    def look(event: GraphEvent) -> None:
         if isinstance(event, Incompatible) and gid in (event.reader.gid, event.writer.gid):
             other = event.writer if event.reader.gid == gid else event.reader
-            owner = other.participant.full_name if other.participant.name else other.gid.hex(".")
-            tool.say(f"{owner} does not match: {'; '.join(event.reasons)}; choose with --qos-...")
+            # Whose endpoint it is comes to be known a little later than the endpoint.
+            loop.call_later(0.0 if other.participant.name else NAME_TIME, tell, other.gid, event.reasons)
 
     for topic in tool.graph.topics:
         for pair in topic.incompatible:
-            tell(pair)
-    tool.graph.watch(tell)
+            look(pair)
+    tool.graph.watch(look)
 
 
 def expression(text: str | None) -> Callable[[Any], bool] | None:
