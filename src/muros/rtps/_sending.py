@@ -1,11 +1,28 @@
 """How much leaves a writer at once: an allowance of bytes, and submessages that share a datagram."""
 
+from typing import Final
+
 from muros.rtps._endpoint import Send
 from muros.rtps._reader_proxy import ReaderProxy
 from muros.rtps._values import EntityId
 from muros.rtps._wire import gap, split_numbers
 
-__all__ = ["Allowance", "Packet", "gaps"]
+__all__ = ["Allowance", "Packet", "Window", "gaps"]
+
+OVERHEAD: Final = 768
+"""Bytes that a sample counts for besides its own: receivers' buffers hold more than what is sent."""
+
+WINDOW_LEAST: Final = 65536
+"""However much is lost, so many bytes may be on their way."""
+
+WINDOW_FIRST: Final = 192 * 1024
+"""And so many to begin with."""
+
+GROWTH: Final = 8
+"""The window grows by this part of what arrives."""
+
+CHECKPOINTS_MOST: Final = 64
+"""Samples remembered that have asked for acknowledgement; of more the newest stands for those before it."""
 
 
 class Allowance:
@@ -14,10 +31,11 @@ class Allowance:
     What is sent while anything is left may overdraw it; the debt is paid before more is allowed.
     """
 
-    __slots__ = ("_burst", "_left", "_pace", "_since")
+    __slots__ = ("_left", "_pace", "_since", "burst")
 
     def __init__(self, burst: int, pace: int) -> None:
-        self._burst = burst
+        self.burst = burst
+        """May be changed."""
         self._pace = pace
         self._left = burst
         self._since = 0
@@ -25,17 +43,92 @@ class Allowance:
     def allows(self, now: int) -> bool:
         """Whether something may be sent."""
         if self._left <= 0:
-            earned = (now - self._since) * self._burst // self._pace
+            earned = (now - self._since) * self.burst // self._pace
             if earned > 0:
-                self._left = min(self._burst, self._left + earned)
+                self._left = min(self.burst, self._left + earned)
                 self._since = now
-        elif self._left == self._burst:
+        elif self._left == self.burst:
             self._since = now
         return self._left > 0
 
     def spend(self, size: int) -> None:
         """`size` bytes were sent."""
         self._left -= size
+
+
+class Window:
+    """How many bytes may be on their way to readers that acknowledge: more while they keep up, fewer when any get lost.
+
+    So a writer is as quick as its slowest reader takes samples, and no receiver's buffer runs over for long.
+    """
+
+    __slots__ = ("_arrived", "_asked", "_cut", "_most", "_moved", "ask", "end", "out", "size")
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self.size = min(WINDOW_FIRST, most)
+        """Bytes that may be on their way now."""
+        self._moved = 0
+        self._arrived = 0
+        self._asked: list[tuple[int, int]] = []
+        self._cut = 0
+        self.out = 0
+        """Bytes that have left, all in all; who sends adds to it."""
+        self.end = self.size
+        """Up to here they may leave without regard to anything else."""
+        self.ask = self.size // 2
+        """From here on acknowledgement is to be asked for."""
+
+    def asked(self, number: int, now: int) -> None:
+        """The sample `number`, the last one that left, asks for acknowledgement."""
+        if not self._asked:
+            self._moved = now
+        if len(self._asked) >= CHECKPOINTS_MOST:
+            self._asked.pop()
+        self._asked.append((number, self.out))
+        self.ask = self.out + self.size // 2
+
+    def waits(self, now: int, patience: int) -> int:
+        """How long nothing more may leave, 0 = it may now. One that stays shut opens by itself after `patience`."""
+        if self.out < self.end:
+            return 0
+        left = self._moved + patience - now
+        if left > 0:
+            return left
+        self._moved = now
+        self.end = self.out + self.size
+        return 0
+
+    def acknowledged(self, number: int, now: int) -> None:
+        """All readers have everything up to the sample `number`."""
+        arrived = self._arrived
+        while self._asked and self._asked[0][0] <= number:
+            arrived = self._asked.pop(0)[1]
+        self._slide(arrived, arrived - self._arrived, now)
+
+    def completed(self, now: int) -> None:
+        """All readers have everything that has left."""
+        self._asked.clear()
+        self._slide(self.out, self.out - self._arrived, now)
+
+    def reset(self, now: int) -> None:
+        """There is nobody left who has not got everything."""
+        self._asked.clear()
+        self._slide(self.out, 0, now)
+
+    def lost(self, now: int, pause: int) -> None:
+        """Something got lost; what is lost within `pause` after that has the same cause."""
+        if now - self._cut >= pause:
+            self._cut = now
+            self.size = max(min(WINDOW_LEAST, self._most), self.size // 2)
+            self.end = self._arrived + self.size
+
+    def _slide(self, arrived: int, grown: int, now: int) -> None:
+        self.size = min(self._most, self.size + grown // GROWTH)
+        self._arrived = arrived
+        self._moved = now
+        self.end = arrived + self.size
+        self.ask = min(self.ask, self.out + self.size // 2)
 
 
 class Packet:

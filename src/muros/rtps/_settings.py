@@ -26,8 +26,10 @@ class WriterSettings:
     """The longest pause."""
     hold_off: int = 10 * MILLISECOND
     """What was sent again to a reader is not sent once more to it within this time."""
+    window: int = 1 << 20
+    """Bytes that may be on their way to reliable readers, at most; fewer while any of them get lost."""
     burst: int = 256 * 1024
-    """Bytes of fragments and repairs sent in one go."""
+    """Bytes of repairs and of fragments that are not within the window, sent in one go."""
     pace: int = MILLISECOND
     """Time in which `burst` is allowed again."""
     patience: int = 10 * SECOND
@@ -39,6 +41,7 @@ class WriterSettings:
             "fragment_size",
             "heartbeat_period",
             "heartbeat_slowest",
+            "window",
             "burst",
             "pace",
             "patience",

@@ -8,8 +8,10 @@ writer is silent. What a reader misses it asks for in ACKNACK or NACK_FRAG; that
 what it shall not wait for, and a HEARTBEAT behind, so that it asks for more at once. A reader that comes late to a
 transient local writer is simply one that lags from the oldest sample kept.
 
-Nothing is sent in floods: fragments and repairs wait in queues and leave within an allowance of `burst` bytes that
-is filled up every `pace`.
+Nothing is sent in floods. What reliable readers have not acknowledged fits a `Window`, and acknowledgement is asked for
+in time to keep it open; what goes beyond it waits. A window that stays shut opens by itself after a while: a silent
+reader slows the others down, but does not stop them. Repairs, what is beyond the window of one large sample, and the
+fragments of best-effort samples leave within an allowance of `burst` bytes that is filled up every `pace`.
 
 A writer that keeps all refuses a sample when `limit` samples wait for acknowledgement. A reader that acknowledges
 nothing for `patience` in that situation is set aside: it holds nobody any more, and is served again from what there
@@ -24,7 +26,7 @@ from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, newer
 from muros.rtps._fragments import fragments_of
 from muros.rtps._history import History, Sample
 from muros.rtps._reader_proxy import ReaderProxy
-from muros.rtps._sending import Allowance, Packet, gaps
+from muros.rtps._sending import OVERHEAD, WINDOW_LEAST, Allowance, Packet, Window, gaps
 from muros.rtps._settings import WRITER_DEFAULTS, WriterSettings
 from muros.rtps._values import EntityId, Guid, GuidPrefix, split_guid
 from muros.rtps._wire import (
@@ -60,6 +62,9 @@ ASK_MOST: Final = 64
 SKIPS_MOST: Final = 24
 """GAPs to several readers at one place that share a datagram."""
 
+LARGE: Final = 8192
+"""Bytes from which on a sample is held back when too much is on its way, though newer ones may push it out."""
+
 EVERYBODY: Final = bytes(12)
 """As destination: whoever listens."""
 
@@ -84,7 +89,7 @@ class WriterCore:
         "_allowance", "_ask_at", "_ask_every", "_count", "_cursor", "_endpoint_qos", "_entity",
         "_history", "_idle", "_lagging", "_leaving", "_lifespan", "_on_room", "_proxies", "_refused",
         "_reliable", "_repairing", "_report", "_retains", "_routes", "_send", "_unasked", "_unsent",
-        "_with_qos", "due", "guid", "last", "reliable", "sent", "settings",
+        "_window", "_with_qos", "due", "guid", "last", "reliable", "sent", "settings",
     )  # fmt: skip
 
     def __init__(
@@ -128,6 +133,7 @@ class WriterCore:
         self._leaving: Sample | None = None  # the first of them, when part of it has left:
         self._cursor = 0  # so many of its fragments
         self._allowance = Allowance(settings.burst, settings.pace)
+        self._window = Window(settings.window)
         self._count = 0
         self._ask_at = 0
         kept = settings.limit if depth is None else max(depth, ASK_LEAST * 4)
@@ -203,6 +209,8 @@ class WriterCore:
         for proxies in (self._idle, self._lagging, self._repairing):
             proxies.pop(proxy, None)
         self._reroute()
+        if not self._lagging:
+            self._window.reset(now)
         if not self._routes:
             self._unsent.clear()
             self._leaving = None
@@ -258,7 +266,7 @@ class WriterCore:
         self.last = sequence
         if not self._routes:
             self.sent = sequence
-        elif self._unsent or not whole:
+        elif self._unsent or not whole or (self._window.out >= self._window.end and self._paces(sample)):
             self._unsent.append(sequence)
             self._pump(now)
         else:
@@ -285,6 +293,13 @@ class WriterCore:
             # two such sides would not come to rest.
             self._send_heartbeat(proxy, final=proxy in self._idle or not (progress or is_first))
         if progress:
+            if self._lagging:
+                self._window.acknowledged(self.acknowledged, now)
+            else:
+                self._window.completed(now)
+            self._adapt()
+            if self._unsent:
+                self._pump(now)
             self._release(now)
 
     def on_nack_frag(self, event: NackFrag, now: int) -> None:
@@ -307,6 +322,7 @@ class WriterCore:
             if not fragments:
                 return
             proxy.wanted[number] = fragments
+            self._lost(now)
         else:
             proxy.wanted[number] = None  # becomes a GAP
         self._repairing[proxy] = None
@@ -358,7 +374,7 @@ class WriterCore:
         )
         submessages = [sample.stamp, content]
         if self._reliable:
-            submessages += self._expect_and_ask(now)
+            submessages += self._expect_and_ask(len(sample.payload), now)
         send = self._send
         for place in self._routes:
             send(submessages, None, place)
@@ -366,7 +382,7 @@ class WriterCore:
     def _transmit_to(self, sample: Sample, now: int) -> None:
         """Send a sample that fits a datagram to the one it is for, and tell the others not to wait for it."""
         self.sent = sample.sequence
-        beat = self._expect_and_ask(now)
+        beat = self._expect_and_ask(len(sample.payload), now)
         proxy = self._proxies.get(sample.to) if sample.to else None
         if proxy is not None:
             content = data(
@@ -402,6 +418,8 @@ class WriterCore:
             sample = self._leaving or self._history.get(unsent[0])
             if sample is None:
                 self.sent = unsent[0]
+            elif not self._cursor and not self._may_begin(sample, now):
+                return
             elif len(sample.payload) + len(sample.inline_qos) <= size:
                 self._transmit(sample, now)
             else:
@@ -421,10 +439,13 @@ class WriterCore:
             proxy = self._proxies.get(sample.to)
             reader, prefix = sample.to[1], sample.to[0]
             places = proxy.places if proxy is not None else ()
-        total = fragments_of(len(sample.payload), self.settings.fragment_size)
+        window, size = self._window, self.settings.fragment_size
+        total = fragments_of(len(sample.payload), size)
         while self._cursor < total:
-            if not self._may_send(now):
-                return False
+            if not (self._reliable and window.out < window.end):
+                if not self._may_send(now):
+                    return False
+                self._allowance.spend(size * len(places))
             self._cursor += 1
             submessages = [sample.stamp, self._fragment(reader, sample, self._cursor)]
             if self._cursor == total:
@@ -432,7 +453,7 @@ class WriterCore:
                 if self._reliable:
                     self._expect(now)
                     submessages.append(self._ask(now))
-            self._allowance.spend(self.settings.fragment_size * len(places))
+            window.out += size
             for place in places:
                 self._send(submessages, prefix, place)
         if sample.to is not None:
@@ -491,6 +512,22 @@ class WriterCore:
             inline_qos=sample.inline_qos, key=sample.key,
         )  # fmt: skip
 
+    def _paces(self, sample: Sample) -> bool:
+        """Whether the window counts for a sample.
+
+        Small ones of a writer that keeps few had better leave at once, for newer ones would push them out.
+        """
+        return bool(self._reliable) and (self._history.depth is None or len(sample.payload) >= LARGE)
+
+    def _may_begin(self, sample: Sample, now: int) -> bool:
+        """Whether one more sample may leave: as reliable readers keep up."""
+        if not self._paces(sample):
+            return True
+        wait = self._window.waits(now, self.settings.hold_off)
+        if wait:
+            self.due = min(self.due, now + wait)
+        return not wait
+
     def _may_send(self, now: int) -> bool:
         """Whether the allowance is not used up; if it is, `tick` is needed after `pace`."""
         if self._allowance.allows(now):
@@ -500,20 +537,23 @@ class WriterCore:
 
     # --- Heartbeats --------------------------------------------------------------------------------------
 
-    def _expect_and_ask(self, now: int) -> list[bytes]:
-        """A sample leaves for reliable readers: it may be time to ask for acknowledgement with it."""
+    def _expect_and_ask(self, size: int, now: int) -> list[bytes]:
+        """A sample of `size` bytes leaves: if reliable readers get it, acknowledgement may be asked for with it."""
         if not self._reliable:
             return []
         if self._idle:
             self._expect(now)
         self._unasked += 1
-        if now >= self._ask_at or self._unasked >= self._ask_every:
+        window = self._window
+        window.out += size + OVERHEAD
+        if now >= self._ask_at or self._unasked >= self._ask_every or window.out >= window.ask:
             return [self._ask(now)]
         return []
 
     def _ask(self, now: int) -> bytes:
         """A heartbeat for everybody that asks for acknowledgement, to go with a sample."""
         self._unasked = 0
+        self._window.asked(self.sent, now)
         self._ask_at = now + self.settings.heartbeat_period // 2
         self._count += 1
         return heartbeat(ENTITYID_UNKNOWN, self._entity, self._lowest(), self.sent, self._count)
@@ -600,10 +640,21 @@ class WriterCore:
             elif number not in repaired and number not in wanted and len(wanted) < WANTED_MOST:
                 repaired.add(number)
                 wanted[number] = None
+        if len(wanted) > before:
+            self._lost(now)
         if len(wanted) > before or gap_sent:
             self._repairing[proxy] = None
             return True
         return False
+
+    def _lost(self, now: int) -> None:
+        """Readers miss something: send less at once."""
+        self._window.lost(now, self.settings.hold_off)
+        self._adapt()
+
+    def _adapt(self) -> None:
+        """What may leave beside the window goes by what the readers have shown to take."""
+        self._allowance.burst = min(self.settings.burst, max(self._window.size, WINDOW_LEAST))
 
     def _reroute(self) -> None:
         """The readers have changed: gather what is asked of all of them for every sample."""
