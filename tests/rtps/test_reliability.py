@@ -393,7 +393,9 @@ def test_large_samples_survive_heavy_loss(retains: bool) -> None:
 def test_large_samples_leave_in_bursts() -> None:
     network = SimulatedNetwork(delay=(MS, MS))
     a, b = Node(network, "a"), Node(network, "b")
-    writer = a.writer(depth=None, settings=WriterSettings(fragment_size=1000, window=1, burst=10_000, pace=2 * MS))
+    writer = a.writer(
+        depth=None, settings=WriterSettings(fragment_size=1000, window=1, burst=10_000, pace=2 * MS)
+    )
     b.reader()
     match(a, b)
     run(network, 10 * MS, a, b)
