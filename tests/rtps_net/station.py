@@ -16,6 +16,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from muros.rtps import (
+    Durability,
     EndpointQos,
     History,
     LocalReader,
@@ -31,6 +32,8 @@ ROOT = Path(__file__).resolve().parents[2]
 TYPE = "std_msgs::msg::dds_::String_"
 HEAD = b"\0\1\0\0"
 KEEP_ALL = EndpointQos(history=History.KEEP_ALL)
+LATE_TOO = EndpointQos(history=History.KEEP_ALL, durability=Durability.TRANSIENT_LOCAL)
+"""The two sides of a match do not learn of it at the same time: what is written between is kept for the later one."""
 TIME_LIMIT = 10.0
 
 
@@ -173,8 +176,8 @@ class Process:
 
 async def exchange(station: Station, sizes: Sequence[int]) -> None:
     """Sends samples of these sizes (multiples of 4) to the echo, and waits for what comes back."""
-    station.reader("rt/pong")
-    writer = station.writer("rt/ping")
+    station.reader("rt/pong", LATE_TOO)
+    writer = station.writer("rt/ping", LATE_TOO)
     await until(lambda: writer.matched)
     await until(lambda: station._readers["rt/pong"].matched)
     sent = [number.to_bytes(4, "big") + bytes(size) for number, size in enumerate(sizes)]
@@ -186,8 +189,8 @@ async def exchange(station: Station, sizes: Sequence[int]) -> None:
 async def _echo(settings: NetworkSettings) -> None:
     station = Station(settings, "echo")
     station.on_sample = lambda topic, payload: station.write("rt/pong", payload)
-    station.writer("rt/pong")
-    station.reader("rt/ping")
+    station.writer("rt/pong", LATE_TOO)
+    station.reader("rt/ping", LATE_TOO)
     async with station:
         print(station.network.index, flush=True)
         loop = asyncio.get_running_loop()

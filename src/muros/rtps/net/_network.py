@@ -34,6 +34,8 @@ SOURCES: Final = 4096
 """Senders whose locator is remembered."""
 ADDRESSES: Final = 16
 """Addresses of this host that peers are told of."""
+LOOK_PERIOD: Final = 200_000_000
+"""ns between two looks at what the kernel had to throw away, while anything comes."""
 ANYWHERE: Final = "0.0.0.0"
 LOOPBACK: Final = "127.0.0.1"
 
@@ -89,6 +91,7 @@ class Network:
         self._overflown: dict[socket.socket, int] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._due = 0
+        self._look_at = 0
 
     @classmethod
     def shared(
@@ -317,8 +320,11 @@ class Network:
                 receive(datagram, source, clock())
             if self._closed:
                 return
-        else:
-            self._count_overflow(sock)
+        now = clock()
+        if now >= self._look_at:
+            self._look_at = now + LOOK_PERIOD
+            for each in self._overflown:
+                self._count_overflow(each)
         self.poke()
 
     def _source(self, address: tuple[str, int]) -> Locator:
