@@ -75,6 +75,9 @@ LASTS_MOST: Final = 10_000
 DEBOUNCE: Final = 10_000_000
 """ns in which changes of a node are gathered before others are told."""
 
+NAMES_KNOWN: Final = 500_000_000
+"""ns after which the node of an endpoint that was met is known."""
+
 INFO_NUMBER: Final = 0xFFFFFF
 """Number of the endpoints that carry `ros_discovery_info`; no other endpoint gets that far."""
 
@@ -375,15 +378,22 @@ class DdsDomain:
         other = self.endpoints.get(event.remote.guid)
         if local is None or (other is not None and isinstance(local, DdsWriter)):
             return  # the reader of a pair of ours tells for both
-        shown = local.info()
-        writer, reader = _ordered(local, shown, self._shown_either(event.remote))
+        writer, reader = _ordered(local, local.info(), self._shown_either(event.remote))
         reasons = self._reasons(writer, reader, event.mismatches)
         core = self.core
         if core.watchers:
             core.tell(Incompatible(writer, reader, tuple(str(reason) for reason in reasons)))
-        names = (reader.participant.owner, writer.participant.owner)
-        told = partial(_reports.mismatched, core, *names, local.topic.name, reasons, who=local.owner)
-        core.notices.append(told)
+        told = partial(self._tell_mismatch, local, event.remote.guid, reasons)
+        if other is not None:
+            core.notices.append(told)
+        else:
+            core.timers.at(core.timers.now() + NAMES_KNOWN, told)
+
+    def _tell_mismatch(self, local: DdsEndpoint, remote: bytes, reasons: tuple[Mismatch, ...]) -> None:
+        """Two do not fit. Told when there was time to hear what the other's node is called."""
+        names = (local.owner, self.name_of(remote))
+        writer, reader = names if isinstance(local, DdsWriter) else names[::-1]
+        _reports.mismatched(self.core, reader, writer, local.topic.name, reasons, who=local.owner)
 
     def _liveliness_lost(self, participant: DdsParticipant, event: rtps.LivelinessLost) -> None:
         local = self.endpoints.get(event.local)
