@@ -12,7 +12,7 @@ from typing import Self
 
 from bench._load_relay import PEER
 
-MUROS = f"{shlex.quote(sys.executable)} -m muros agent udp4 -p {{port}}"
+MUROS = f"{shlex.quote(sys.executable)} -m muros agent -m local udp4 -p {{port}}"
 """The agent as users run it."""
 RELAY = (
     f"{shlex.quote(sys.executable)} {shlex.quote(str(Path(__file__).with_name('_load_relay.py')))} {{port}}"
