@@ -584,7 +584,7 @@ class SpaceConformance:
         shallow = space.participant("shallow").reader(CHATTER, LATCHED.replace(depth=1))
         deep = space.participant("deep").reader(CHATTER, LATCHED.replace(depth=10))
         self.settle(space)
-        assert calls == [3]
+        assert calls in ([3], [1]), "once, when all is there or when the first is"
         assert take_all(shallow) == [numbered(4)]
         assert take_all(deep) == [numbered(2), numbered(3), numbered(4)], "the writer keeps 3"
         writer.write(numbered(5))
