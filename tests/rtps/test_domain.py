@@ -416,7 +416,7 @@ def test_one_that_misses_the_answer_to_its_announcement_is_told_again_soon() -> 
     sent = world.record()
     left.core.receive(announcement(left), STRANGER, left.now)
     start = world.network.now
-    world.run(2 * SECOND)
+    world.run(1500 * MS)
     told = [
         (datagram.sent_at - start) / MS
         for datagram in sent
@@ -431,7 +431,7 @@ def test_one_that_has_answered_is_not_told_again() -> None:
     world.run(20 * SECOND)
     late = right.participant()
     sent = world.record()
-    world.run(2 * SECOND)
+    world.run(1500 * MS)
     announcements = [
         d for d in sent if d.receiver == right.meta and left.core.participants[0].data.payload() in d.data
     ]

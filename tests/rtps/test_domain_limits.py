@@ -11,8 +11,6 @@ from muros.rtps import (
     EndpointData,
     EndpointQos,
     ParticipantCore,
-    ParticipantData,
-    udp4,
 )
 from muros.rtps._constants import (
     ENTITYID_PARTICIPANT_MESSAGE_WRITER,
@@ -21,47 +19,10 @@ from muros.rtps._constants import (
     ENTITYID_SPDP_READER,
     ENTITYID_SPDP_WRITER,
 )
-from muros.rtps._discovery_data import Assertion, departure
-from muros.rtps._wire import data, heartbeat, message
+from muros.rtps._discovery_data import Assertion
+from muros.rtps._wire import data, heartbeat
 from tests.rtps.domains import MS, SECOND, TYPE, Process, World
-
-
-class Stranger:
-    """A participant made of bytes, that does what it likes."""
-
-    def __init__(self, process: Process, number: int = 1, **options: Any) -> None:
-        self.process = process
-        self.prefix = b"stranger" + number.to_bytes(4, "big")
-        self.at = udp4("10.9.9.9", 7410 + number)
-        self.told = ParticipantData(
-            prefix=self.prefix, metatraffic_unicast=(self.at,), default_unicast=(self.at,), **options
-        )
-        self.announced = 0
-        self.sequence = 0
-
-    def send(self, *submessages: bytes) -> None:
-        self.process.core.receive(message(self.prefix, *submessages), self.at, self.process.now)
-
-    def announce(self) -> None:
-        self.announced += 1
-        self.send(data(ENTITYID_SPDP_READER, ENTITYID_SPDP_WRITER, self.announced, self.told.payload()))
-
-    def tell(
-        self, number: int, *, entity_prefix: bytes = b"", user_data: bytes = b"", topic: str = "rt/a"
-    ) -> None:
-        """It has a writer."""
-        told = EndpointData(
-            guid=(entity_prefix or self.prefix) + (number << 8 | 3).to_bytes(4, "big"),
-            topic=topic,
-            type_name=TYPE,
-            qos=EndpointQos(),
-            user_data=user_data,
-        )
-        self.say(ENTITYID_SEDP_PUBLICATIONS_WRITER, told.payload())
-
-    def say(self, writer: int, payload: bytes, inline_qos: bytes = b"") -> None:
-        self.sequence += 1
-        self.send(data(0, writer, self.sequence, payload, inline_qos=inline_qos))
+from tests.rtps.strangers import Stranger
 
 
 def met(**settings: Any) -> tuple[World, Process, ParticipantCore, Stranger]:
@@ -92,11 +53,11 @@ def test_participants_of_this_process_do_not_count_as_peers() -> None:
 def test_endpoints_of_a_peer_are_limited() -> None:
     _, process, participant, stranger = met(endpoints_per_peer=5)
     for number in range(20):
-        stranger.tell(number)
+        stranger.endpoint(number << 8 | 3)
     assert len(participant.endpoints) == 5
     assert [report.problem for report in process.reports] == [DomainProblem.TOO_MANY_ENDPOINTS]
-    stranger.say(ENTITYID_SEDP_PUBLICATIONS_WRITER, b"", departure(participant.endpoints[0].guid))
-    stranger.tell(99)
+    stranger.withdraw(participant.endpoints[0])
+    stranger.endpoint(99 << 8 | 3)
     assert len(participant.endpoints) == 5
     assert participant.endpoint(stranger.prefix + (99 << 8 | 3).to_bytes(4, "big")) is not None
 
@@ -104,19 +65,19 @@ def test_endpoints_of_a_peer_are_limited() -> None:
 def test_what_a_peer_says_is_limited_in_size() -> None:
     _, process, participant, stranger = met(memory_per_peer=10_000)
     for number in range(20):
-        stranger.tell(number, user_data=bytes(3000))
+        stranger.endpoint(number << 8 | 3, user_data=bytes(3000))
     assert len(participant.endpoints) == 3
     assert [report.problem for report in process.reports] == [DomainProblem.DISCOVERY_TOO_LARGE]
     for _ in range(20):
-        stranger.tell(0, user_data=bytes(10))  # what is said anew counts once
-        stranger.tell(0, user_data=bytes(20))
+        stranger.endpoint(3, user_data=bytes(10))  # what is said anew counts once
+        stranger.endpoint(3, user_data=bytes(20))
     assert len(participant.endpoint(stranger.prefix + b"\0\0\0\3").user_data) == 20  # type: ignore[union-attr]
 
 
 def test_changes_are_limited_in_time_and_heard_later() -> None:
     world, process, participant, stranger = met(changes_burst=10, changes_per_second=100)
     for number in range(50):
-        stranger.tell(number)
+        stranger.endpoint(number << 8 | 3)
     assert len(participant.endpoints) == 10
     assert [report.problem for report in process.reports] == [DomainProblem.FLOOD]
     world.run(100 * MS)
@@ -127,13 +88,10 @@ def test_changes_are_limited_in_time_and_heard_later() -> None:
 
 def test_nobody_speaks_of_anothers_endpoints() -> None:
     _, process, participant, stranger = met()
-    stranger.tell(1, entity_prefix=b"another one.")
+    stranger.endpoint(0x103, prefix=b"another one.")
     writer = EndpointData(guid=stranger.prefix + b"\0\0\1\3", topic="t", type_name=TYPE, qos=EndpointQos())
     stranger.say(ENTITYID_SEDP_SUBSCRIPTIONS_WRITER, writer.payload())
-    assert process.core.counters["prefix-mismatch"] == 1
-    stranger.sequence = 0  # another writer, with numbers of its own
-    stranger.say(ENTITYID_SEDP_SUBSCRIPTIONS_WRITER, writer.payload())
-    assert process.core.counters["prefix-mismatch"] == 3
+    assert process.core.counters["prefix-mismatch"] == 2
     assert participant.endpoints == ()
 
 
@@ -141,13 +99,11 @@ def test_malformed_discovery_is_counted_and_what_follows_is_heard() -> None:
     _, process, participant, stranger = met()
     stranger.say(ENTITYID_SEDP_PUBLICATIONS_WRITER, b"\0\3\0\0nonsense")
     stranger.say(ENTITYID_SEDP_PUBLICATIONS_WRITER, b"")
-    stranger.tell(7)
-    stranger.sequence = 0
+    stranger.endpoint(0x703)
     stranger.say(ENTITYID_PARTICIPANT_MESSAGE_WRITER, b"\0\1\0\0")
     stranger.say(ENTITYID_PARTICIPANT_MESSAGE_WRITER, Assertion(b"another one.", False).payload())
     assert len(participant.endpoints) == 1
     assert process.core.counters["discovery-malformed"] == 3
-    stranger.sequence = 99
     stranger.send(
         data(ENTITYID_SPDP_READER, ENTITYID_SPDP_WRITER, 50, b"\0\3\0\0nonsense"),
     )

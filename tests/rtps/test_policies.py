@@ -371,6 +371,24 @@ def test_ownership_is_of_each_instance() -> None:
     ]
 
 
+def test_an_owner_that_misses_the_readers_deadline_is_not_waited_for() -> None:
+    world = World()
+    left, right = world.process(), world.process()
+    qos = EndpointQos(ownership=Ownership.EXCLUSIVE, deadline=SECOND)
+    weak = left.writer(left.participant(), qos=qos)
+    strong = left.writer(left.participant(), qos=replace(qos, strength=1))
+    reader = right.reader(right.participant(), qos=qos)
+    world.run(SECOND)
+    for number in range(3):
+        strong.write(payload(number), left.now)
+        world.run(800 * MS)
+        weak.write(payload(100 + number), left.now)
+    world.run(800 * MS)
+    weak.write(payload(200), left.now)
+    world.run(SECOND)
+    assert [s.payload for s in right.got[reader.guid]] == [payload(n) for n in (0, 1, 2, 200)]
+
+
 # --- Keys and inline QoS ---------------------------------------------------------------------------------
 
 

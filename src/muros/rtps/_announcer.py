@@ -74,8 +74,8 @@ class Announcer(Timed):
 
     def wake(self, now: int) -> int:
         places = dict.fromkeys(self.announce_to)
-        share = self._data.lease // SHARE
-        if now - self._told >= min(share, self._settings.lease // SHARE):
+        share = min(self._data.lease, self._settings.lease) // SHARE
+        if now + self._period - self._told > share:  # the next time would be too late
             self._told = now
             places.update(self._peers())
         self._announce(places)
