@@ -14,11 +14,11 @@ from typing import Any
 
 from muros import interfaces
 from muros.cli._learn import make_known
-from muros.cli._names import full_name, learn_types, message_class, node_name, ros_topics
+from muros.cli._names import full_name, learn_types, message_class, node_name, ros_topic
 from muros.cli._qos import chosen_qos, fitted_qos, has_choice
 from muros.cli._tool import CommandError, Tool
 from muros.cli._values import Look, dump, hex_dump, pick, to_csv, to_yaml
-from muros.space import CDR_BE, CDR_LE, Endpoint, GraphEvent, Incompatible, Qos, Sample, Topic
+from muros.space import CDR_BE, CDR_LE, GraphEvent, Incompatible, Qos, Sample, Topic
 
 __all__ = ["echo", "expression", "reader_qos", "type_to_read"]
 
@@ -60,10 +60,12 @@ async def type_to_read(tool: Tool, name: str, given: str | None) -> str:
     """The type to read a topic with: the one given, else that of the graph, waited for if nobody is there yet."""
 
     def types() -> tuple[str, ...]:
-        return next((t.types for t in ros_topics(tool) if t.name == name), ())
+        topic = ros_topic(tool, name)
+        return () if topic is None else topic.types
 
     def has_writer(_: object) -> bool:
-        return any(t.name == name and t.writers for t in ros_topics(tool))
+        topic = ros_topic(tool, name)
+        return topic is not None and bool(topic.writers)
 
     await tool.discover(until=has_writer)
     if given is not None:
@@ -92,11 +94,8 @@ def reader_qos(tool: Tool, name: str, arguments: argparse.Namespace) -> Qos:
         raise CommandError(str(error), 2) from None
     if has_choice(arguments):
         return qos
-    writers: list[Endpoint] = []
-    for topic in ros_topics(tool):
-        if topic.name == name:
-            writers += topic.writers
-    fitted, notes = fitted_qos(qos, writers)
+    topic = ros_topic(tool, name)
+    fitted, notes = fitted_qos(qos, topic.writers if topic else ())
     for note in notes:
         tool.say(f"{name}: {note}")
     return fitted.replace(depth=max(DEPTH, qos.depth))
@@ -117,9 +116,10 @@ def tell_of_mismatches(tool: Tool, gid: bytes) -> None:
             # Whose endpoint it is comes to be known a little later than the endpoint.
             loop.call_later(0.0 if other.participant.name else NAME_TIME, tell, other.gid, event.reasons)
 
-    for topic in tool.graph.topics:
-        for pair in topic.incompatible:
-            look(pair)
+    own = tool.graph.endpoint(gid)
+    topic = tool.graph.topic(own.topic, tool.domain) if own else None
+    for pair in topic.incompatible if topic else ():
+        look(pair)
     tool.graph.watch(look)
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from muros import interfaces
 from muros.cdr import CdrError
-from muros.cli._names import ros_topics, ros_type, service_of
+from muros.cli._names import ros_topic, ros_type, service_of
 from muros.interfaces import InterfaceError
 from muros.interfaces._hashes import rihs01
 
@@ -64,8 +64,8 @@ async def learn(tool: Tool, type_name: str, endpoints: Iterable[Endpoint]) -> bo
 
 def _users(tool: Tool, topic: str, type_name: str) -> list[Endpoint]:
     """The endpoints of a topic that announce the hash of this type."""
-    topics = [t for t in ros_topics(tool) if t.name == topic]
-    endpoints = [e for t in topics for e in (*t.writers, *t.readers)]
+    found = ros_topic(tool, topic)
+    endpoints = (*found.writers, *found.readers) if found else ()
     return [e for e in endpoints if e.type_hash and ros_type(e.type_name) == type_name]
 
 

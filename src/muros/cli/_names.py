@@ -12,11 +12,12 @@ from muros.interfaces import InterfaceError
 
 if TYPE_CHECKING:
     from muros.cli._tool import Tool
-    from muros.space import Endpoint, ParticipantInfo, Service
+    from muros.space import Endpoint, ParticipantInfo, Service, ServiceInfo, TopicInfo
 
 __all__ = [
     "RosService", "RosTopic", "add_type_options", "full_name", "is_hidden", "learn_types", "message_class",
-    "ros_services", "ros_topics", "ros_type", "service_of", "service_type", "type_of_service",
+    "node_name", "required_class", "ros_service", "ros_services", "ros_topic", "ros_topics", "ros_type",
+    "service_of", "service_type", "type_of_service",
 ]  # fmt: skip
 
 
@@ -90,30 +91,43 @@ def service_type(dds_name: str) -> str:
 
 def ros_topics(tool: Tool, *, plain_dds: bool = False) -> list[RosTopic]:
     """The topics of others, by name; with `plain_dds` under their DDS names, those that are not of ROS included."""
-    found = []
-    for topic in tool.graph.topics:
-        if topic.domain != tool.domain:
-            continue
-        name = topic.name if plain_dds else interfaces.ros_topic(topic.name)
-        writers, readers = tuple(tool.others(topic.writers)), tuple(tool.others(topic.readers))
-        if name is None or not (writers or readers):
-            continue
-        types = _unique(e.type_name if plain_dds else ros_type(e.type_name) for e in (*writers, *readers))
-        found.append(RosTopic(name, topic.name, types, writers, readers))
-    return sorted(found)
+    found = [_topic(tool, info, plain_dds) for info in tool.graph.topics if info.domain == tool.domain]
+    return sorted(topic for topic in found if topic is not None)
+
+
+def ros_topic(tool: Tool, name: str) -> RosTopic | None:
+    """One topic of others by its ROS name, None if there is none; quick in a large graph too."""
+    info = tool.graph.topic(interfaces.dds_topic(name), tool.domain)
+    return None if info is None else _topic(tool, info, False)
+
+
+def _topic(tool: Tool, info: TopicInfo, plain_dds: bool) -> RosTopic | None:
+    name = info.name if plain_dds else interfaces.ros_topic(info.name)
+    writers, readers = tuple(tool.others(info.writers)), tuple(tool.others(info.readers))
+    if name is None or not (writers or readers):
+        return None
+    types = _unique(e.type_name if plain_dds else ros_type(e.type_name) for e in (*writers, *readers))
+    return RosTopic(name, info.name, types, writers, readers)
 
 
 def ros_services(tool: Tool) -> list[RosService]:
     """The services of others, by name."""
-    found = []
-    for service in tool.graph.services:
-        if service.domain != tool.domain:
-            continue
-        servers, clients = tuple(tool.others(service.servers)), tuple(tool.others(service.clients))
-        if servers or clients:
-            types = _unique(service_type(e.type_name) for e in (*servers, *clients))
-            found.append(RosService(service.name, types, servers, clients))
-    return sorted(found)
+    found = [_service(tool, info) for info in tool.graph.services if info.domain == tool.domain]
+    return sorted(service for service in found if service is not None)
+
+
+def ros_service(tool: Tool, name: str) -> RosService | None:
+    """One service of others, None if there is none."""
+    info = tool.graph.service(name, tool.domain)
+    return None if info is None else _service(tool, info)
+
+
+def _service(tool: Tool, info: ServiceInfo) -> RosService | None:
+    servers, clients = tuple(tool.others(info.servers)), tuple(tool.others(info.clients))
+    if not (servers or clients):
+        return None
+    types = _unique(service_type(e.type_name) for e in (*servers, *clients))
+    return RosService(info.name, types, servers, clients)
 
 
 def node_name(participant: ParticipantInfo) -> str:

@@ -14,7 +14,7 @@ import yaml
 from muros import interfaces
 from muros.cli._echo import tell_of_mismatches
 from muros.cli._learn import make_known
-from muros.cli._names import full_name, learn_types, required_class, ros_topics
+from muros.cli._names import full_name, learn_types, required_class, ros_topic
 from muros.cli._qos import chosen_qos
 from muros.cli._tool import CommandError, Tool
 from muros.cli._values import Stamp, fill, read_yaml
@@ -34,7 +34,7 @@ async def publish(tool: Tool, arguments: argparse.Namespace) -> None:
     name = full_name(arguments.topic_name)
     type_name = "/".join(interfaces.split_type(arguments.message_type))
     if not interfaces.known(type_name):
-        await tool.discover(until=lambda _: any(t.name == name for t in ros_topics(tool)))
+        await tool.discover(until=lambda _: ros_topic(tool, name) is not None)
         await make_known(tool, name, type_name)
     made = required_class(type_name)
     messages = _messages(made, arguments)
@@ -140,7 +140,7 @@ async def _loop(
 
 
 def _tell_of_other_types(tool: Tool, name: str, type_name: str) -> None:
-    for topic in ros_topics(tool):
-        others = [t for t in topic.types if t != type_name]
-        if topic.name == name and others:
-            tool.say(f"{name} is {', '.join(others)} for others: they will not hear {type_name}")
+    topic = ros_topic(tool, name)
+    others = [t for t in topic.types if t != type_name] if topic else []
+    if others:
+        tool.say(f"{name} is {', '.join(others)} for others: they will not hear {type_name}")

@@ -73,9 +73,14 @@ class Tool:
 
     @property
     def participant(self) -> Participant:
-        """The command's own place in the space, made when it is first needed."""
+        """The command's own place in the space, made when it is first needed. InterfaceError for a bad name."""
         if self._participant is None:
-            self._participant = self.space.participant(self.node_name, domain=self.domain)
+            from muros.interfaces import check_namespace, check_node_name
+
+            namespace, _, name = self.node_name.rpartition("/")
+            self._participant = self.space.participant(
+                check_node_name(name), namespace=check_namespace(namespace), domain=self.domain
+            )
         return self._participant
 
     @property

@@ -14,6 +14,7 @@ from muros.cli._names import (
     full_name,
     is_hidden,
     learn_types,
+    ros_service,
     ros_services,
     service_of,
     type_of_service,
@@ -158,7 +159,8 @@ async def _served_type(tool: Tool, name: str, timeout: float | None) -> str:
     """The type that the graph says a service has. CommandError if there is none, or several."""
 
     def types() -> tuple[str, ...]:
-        return next((s.types for s in ros_services(tool) if s.name == name), ())
+        service = ros_service(tool, name)
+        return () if service is None else service.types
 
     await tool.discover(until=lambda _: bool(types()))
     if not types():
