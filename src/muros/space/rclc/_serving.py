@@ -22,11 +22,14 @@ import threading
 import time
 from collections.abc import Callable
 from contextvars import Context
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 
 from muros.rclc.errors import RclError
 
 __all__ = ["Server", "Waiter", "server"]
+
+JUST_NOW: Final = 50e-6
+"""Seconds after which a loop that ran is looked at again by who does not wait: about what a message costs."""
 
 
 class Waiter(Protocol):
@@ -53,7 +56,7 @@ class Server:
         self.asleep = False  # the driver is in its selector and does not hold the lock
 
     @property
-    def loop(self) -> asyncio.AbstractEventLoop:
+    def loop(self) -> _Loop:
         """The loop, made when it is first needed."""
         if self._loop is None:
             self._loop = _Loop(self)
@@ -69,9 +72,15 @@ class Server:
         self._tidy()
 
     def poll(self, waiter: Waiter) -> None:
-        """Have the spaces do what is due and take what has come, without waiting."""
+        """Have the spaces do what is due and take what has come, without waiting.
+
+        Nothing is done so soon after the last time that only what came in between could be missed.
+        """
         with self.lock:
-            if self._driver is None:
+            loop = self._loop
+            if self._driver is None and (
+                loop is None or loop.posted or time.monotonic() - self.served > JUST_NOW
+            ):
                 self._drive(waiter, 0.0)
 
     def wait(self, waiter: Waiter, seconds: float) -> None:
@@ -111,6 +120,7 @@ class Server:
         loop = self.loop
         outer = asyncio._get_running_loop()
         self._driver, self._end, self._thread = waiter, end, threading.get_ident()
+        loop.posted = False
         if outer is not None:
             asyncio._set_running_loop(None)
         try:
@@ -136,6 +146,7 @@ class _Loop(asyncio.SelectorEventLoop):
 
     def __init__(self, owner: Server) -> None:
         self._owner = owner
+        self.posted = False  # there are calls to make
         super().__init__(_Selector(owner, self))
         self.set_debug(False)  # its check of threads knows nothing of the lock
 
@@ -150,6 +161,7 @@ class _Loop(asyncio.SelectorEventLoop):
         self, callback: Callable[..., object], *args: Any, context: Context | None = None
     ) -> asyncio.Handle:
         """Call `callback` in the next round."""
+        self.posted = True
         if self._owner.asleep:
             return self.call_soon_threadsafe(callback, *args, context=context)
         return super().call_soon(callback, *args, context=context)
