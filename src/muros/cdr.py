@@ -51,6 +51,11 @@ def integer(buf: "bytearray", p: int, size: int, signed: int) -> int:
     return n
 
 
+def numbers(values: "Any", code: str, size: int = 0) -> "Any":
+    """What a constructor was given for an array, or else a new one of ``size`` zero bytes."""
+    return array(code, bytes(size)) if values is None else values
+
+
 def block(values: "Sequence[Any]", code: str, n: int) -> "Any":
     """The ``n`` numbers of an array as what ``struct`` packs with ``s``. Anything but an array or bytes allocates."""
     if not isinstance(values, array) and not isinstance(values, bytes):  # a tuple of both would allocate

@@ -1,13 +1,13 @@
-"""CDR for boards: sequences of numbers; see :mod:`muros.cdr` and :mod:`muros.cdr_texts`.
+"""CDR for boards: sequences of numbers and of strings; see :mod:`muros.cdr` and :mod:`muros.cdr_texts`.
 
-A ``code`` is one of ``struct`` and ``array``; ``B`` stands for bytes and ``?`` for a list of bools.
+A ``code`` is one of ``struct`` and ``array``; ``B`` stands for bytes, ``s`` for strings.
 """
 
 from array import array
-from struct import pack_into
+from struct import calcsize, pack_into
 
 from muros.cdr import block
-from muros.cdr_texts import count, pad, part, put_count
+from muros.cdr_texts import count, pad, part, put_count, put_text, text, text_size
 from muros.compat import const
 
 TYPE_CHECKING = const(0)
@@ -16,35 +16,53 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def numbers(at: "list[Any]", code: str, size: int, bound: int = 0) -> "Any":
-    """The next sequence of numbers, of ``size`` bytes each, as an array, bytes or a list of bools."""
-    n = count(at, size, bound) * size
+def sequence(at: "list[Any]", code: str, bound: int = 0) -> "Any":
+    """The next sequence: an array, bytes or a list of strings. Allocates twice its bytes."""
+    size = calcsize(code)
+    n = count(at, size, bound)
+    if code == "s":
+        return [text(at) for _ in range(n)]
+    n *= size
     p = part(at, size, n) if n else 0
     data = bytes(memoryview(at[0])[p : p + n])
-    if code == "B":
-        return data
-    return [c != 0 for c in data] if code == "?" else array(code, data)
+    return data if code == "B" else array(code, data)
 
 
-def list_size(p: int, align: int, size: int, n: int) -> int:
-    """The size of a message up to and with ``n`` elements of ``size`` bytes each, ``p`` without them."""
-    p = (p + 3 & -4) + 4
-    return (p + align - 1 & -align) + n * size if n else p
-
-
-def put_numbers(
-    buf: "bytearray", p: int, off: int, values: "Sequence[Any]", code: str, size: int, bound: int = 0
+def put_sequence(
+    buf: "bytearray", p: int, off: int, values: "Sequence[Any]", code: str, bound: int = 0
 ) -> int:
-    """Writes a sequence of numbers; returns the offset behind it. Allocates unless they are bytes."""
+    """Writes a sequence; returns the offset behind it. Allocates unless it is of bytes."""
     n = len(values)
     p = put_count(buf, p, off, n, bound)
+    if code == "s":
+        for value in values:
+            p = put_text(buf, p, off, value)
+        return p
     if not n:
         return p
+    size = calcsize(code)
     p = pad(buf, p, off, size)
     end = p + n * size
-    values = block(values, "B" if code == "?" else code, n)
-    if code == "B" or code == "?":
+    values = block(values, code, n)
+    if code == "B":
         buf[p:end] = values  # unlike a format, it takes no heap
     else:
         pack_into("%ds" % (end - p), buf, p, values)
     return end
+
+
+def sequence_size(p: int, values: "Sequence[Any]", code: str) -> int:
+    """The size of a message up to and with a sequence, ``p`` without it."""
+    if code != "s":
+        size = calcsize(code)
+        return list_size(p, values, size, size)
+    p = list_size(p, values, 1, 0)
+    for value in values:
+        p = text_size(p, value)
+    return p
+
+
+def list_size(p: int, values: "Sequence[Any]", align: int, size: int) -> int:
+    """The size of a message up to and with elements of ``size`` bytes each, ``p`` without them."""
+    p = (p + 3 & -4) + 4
+    return (p + align - 1 & -align) + len(values) * size if len(values) else p

@@ -5,7 +5,7 @@ moves the position. Writing, the position is passed and returned, since publishi
 aligned here, so that generated code, of which there is much, stays short.
 """
 
-from struct import pack_into
+from struct import calcsize, pack_into, unpack_from
 
 from muros.cdr import CdrError, ended, integer, need
 from muros.compat import const
@@ -22,6 +22,11 @@ def part(at: "list[Any]", align: int, size: int) -> int:
     need(at[2] - p, size)
     at[3] = p + size
     return p
+
+
+def unpack(at: "list[Any]", form: str, align: int) -> "tuple[Any, ...]":
+    """The next numbers, in a format of ``struct`` that begins at a multiple of ``align``. Allocates them."""
+    return unpack_from(form, at[0], part(at, align, calcsize(form)))
 
 
 def finish(at: "list[Any]") -> None:

@@ -18,6 +18,8 @@ from muros.cli._floor import write as write
 from tests.micropython.runtimes import ROOT, BoardError
 
 _CACHE = ROOT / "build" / "mpy"
+_COMPILER = (ROOT / "src/muros/cli/_floor.py").read_bytes()
+"""What compiles: when it changes, nothing that it made before is used."""
 
 
 def compiled(tree: Mapping[str, bytes], march: str | None = None) -> Tree:
@@ -26,7 +28,9 @@ def compiled(tree: Mapping[str, bytes], march: str | None = None) -> Tree:
 
 
 def _compile(path: str, content: bytes, march: str | None) -> bytes:
-    key = hashlib.sha256(b"\0".join([path.encode(), (march or "").encode(), content])).hexdigest()[:24]
+    key = hashlib.sha256(b"\0".join([path.encode(), (march or "").encode(), _COMPILER, content])).hexdigest()[
+        :24
+    ]
     cached = _CACHE / f"{key}.mpy"
     if not cached.exists():
         _CACHE.mkdir(parents=True, exist_ok=True)

@@ -91,7 +91,7 @@ class Shared:
         for verb, arguments, code in (
             ("size", "m, p", _Sizer(None, self).element(body)),
             ("write", "m, buf, p, off", _Writer(None, self).element(body)),
-            ("read", "m, buf, at", _Reader(blank, self).element(body)),
+            ("read", "m, at", _Reader(blank, self).element(body)),
         ):
             name = self.function(verb, type_name)
             made[name] = [f"def {name}({arguments}):", *(f"    {line}" for line in code)]
@@ -222,8 +222,10 @@ class _Sizer(_Placed):
                 memo = _memo_arguments(self.code, leaf, self._memo)
                 self._moved(f"text_size({self._position()}, {value}{memo})")
             case Numbers():
-                count = f"len({self.code.place(leaf.path)})"
-                self._moved(f"list_size({self._position()}, {leaf.size}, {leaf.size}, {count})")
+                code = _bytewise(leaf.code)
+                self._moved(f'sequence_size({self._position()}, {self.code.place(leaf.path)}, "{code}")')
+            case Many() if _is_texts(leaf):
+                self._moved(f'sequence_size({self._position()}, {self.code.place(leaf.path)}, "s")')
             case Many():
                 self._many(leaf)
             case Group():
@@ -234,7 +236,7 @@ class _Sizer(_Placed):
         items = self.code.place(leaf.path)
         stride = None if leaf.count else _stride(leaf.body)
         if stride:
-            self._moved(f"list_size({self._position()}, {stride[0]}, {stride[1]}, len({items}))")
+            self._moved(f"list_size({self._position()}, {items}, {stride[0]}, {stride[1]})")
             return
         if not leaf.count:
             self._skip(4, 4)
@@ -266,10 +268,10 @@ class _Writer(_Placed):
     def _leaf(self, leaf: Leaf) -> None:
         match leaf:
             case Scalar():
-                code = "B" if leaf.code == "?" else leaf.code
+                code = _bytewise(leaf.code)
                 self._value(leaf.size, code, self.code.place(leaf.path), leaf.size)
             case Block():
-                code = "B" if leaf.code == "?" else leaf.code
+                code = _bytewise(leaf.code)
                 value = f'block({self.code.place(leaf.path)}, "{code}", {leaf.count})'
                 self._value(leaf.size, f"{leaf.size * leaf.count}s", value, leaf.size * leaf.count)
             case Dummy():
@@ -281,7 +283,10 @@ class _Writer(_Placed):
                 self._call("put_text", f"{self.code.place(leaf.path)}{memo}{bound}")
             case Numbers():
                 bound = f", {leaf.bound}" if leaf.bound else ""
-                self._call("put_numbers", f'{self.code.place(leaf.path)}, "{leaf.code}", {leaf.size}{bound}')
+                self._call("put_sequence", f'{self.code.place(leaf.path)}, "{_bytewise(leaf.code)}"{bound}')
+            case Many() if _is_texts(leaf):
+                bound = f", {leaf.bound}" if leaf.bound else ""
+                self._call("put_sequence", f'{self.code.place(leaf.path)}, "s"{bound}')
             case Many():
                 self._many(leaf)
             case Group():
@@ -349,7 +354,7 @@ class _Runs(_Walker):
                 target, size = self.code.place(leaf.path), leaf.size * leaf.count
                 self._value(leaf.size, f"{size}s", target, size)
                 if leaf.code == "?":
-                    self._later.append(f"{target} = [c != 0 for c in {target}]")
+                    self._later.append(f"{target} = {_bools(target)}")
                 elif leaf.code != "B":
                     self._later.append(f'{target} = array("{leaf.code}", {target})')
             case Dummy():
@@ -361,30 +366,16 @@ class _Runs(_Walker):
             self._run.append(("", "", pad))
         self._run.append((chunk, target, size))
 
-    def _size(self) -> int:
-        return sum(width for _, _, width in self._run)
-
-    def _get(self, base: str, unpack: bool) -> None:
-        """Reads the run that begins at ``base``."""
-        if unpack or any(chunk[-1:] in ("f", "d", "s") for chunk, _, _ in self._run):
-            self._unpack(base)
-        else:
-            at = 0
-            for chunk, target, width in self._run:
-                if chunk:
-                    self.code.line(f"{target} = {_integer(chunk, width, f'{base} + {at}' if at else base)}")
-                at += width
-        for line in self._later:
-            self.code.line(line)
-        self._run, self._later = [], []
-
-    def _unpack(self, base: str) -> None:
-        chunks = [chunk.replace("?", "B") or f"{width}x" for chunk, _, width in self._run]
+    def _unpack(self, call: str) -> None:
+        """Reads the run at once; ``call`` has a place for the format."""
+        chunks = [_bytewise(chunk) or f"{width}x" for chunk, _, width in self._run]
         targets = [target for chunk, target, _ in self._run if chunk]
         bools = [f"{target} = {target} != 0" for chunk, target, _ in self._run if chunk == "?"]
         head = ", ".join(targets) + ("," if len(targets) == 1 else "")
-        self.code.line(f'{head} = unpack_from("{format_text("<", chunks)}", buf, {base})')
-        self._later = bools + self._later
+        self.code.line(f"{head} = {call.format(format_text('<', chunks))}")
+        for line in bools + self._later:
+            self.code.line(line)
+        self._run, self._later = [], []
 
 
 class _FixedReader(_Runs):
@@ -393,9 +384,20 @@ class _FixedReader(_Runs):
     def run(self, found: Sequence[Leaf], size: int) -> list[str]:
         self.code.line(f"need(n, {size})")
         self._walk(found)
-        self._get("off", unpack=False)
+        if any(chunk[-1:] in ("f", "d", "s") for chunk, _, _ in self._run):
+            self._unpack('unpack_from("{}", buf, off)')
+        else:
+            self._read()
         self.code.line(f"ended(n - {size})")
         return self.code.lines
+
+    def _read(self) -> None:
+        """Reads integers one by one."""
+        at = 0
+        for chunk, target, width in self._run:
+            if chunk:
+                self.code.line(f"{target} = {_integer(chunk, width, f'off + {at}' if at else 'off')}")
+            at += width
 
 
 class _Reader(_Runs):
@@ -424,24 +426,27 @@ class _Reader(_Runs):
     def _leaf(self, leaf: Leaf) -> None:
         match leaf:
             case Text():
-                self._call(leaf.path, "text", str(leaf.bound) if leaf.bound else "")
+                self._assign(leaf.path, f"text(at, {leaf.bound})" if leaf.bound else "text(at)")
             case Numbers():
                 bound = f", {leaf.bound}" if leaf.bound else ""
-                self._call(leaf.path, "numbers", f'"{leaf.code}", {leaf.size}{bound}')
+                value = f'sequence(at, "{_bytewise(leaf.code)}"{bound})'
+                self._assign(leaf.path, _bools(value) if leaf.code == "?" else value)
+            case Many() if _is_texts(leaf):
+                bound = f", {leaf.bound}" if leaf.bound else ""
+                self._assign(leaf.path, f'sequence(at, "s"{bound})')
             case Many():
                 self._flush()
                 self._many(leaf)
             case Group():
                 self._flush()
                 function = self._shared.function("read", leaf.type_name)
-                self.code.line(f"{function}({self.code.place(leaf.path)}, buf, at)")
+                self.code.line(f"{function}({self.code.place(leaf.path)}, at)")
             case _:
                 super()._leaf(leaf)
 
-    def _call(self, path: Path, function: str, arguments: str) -> None:
+    def _assign(self, path: Path, value: str) -> None:
         self._flush()
-        more = f", {arguments}" if arguments else ""
-        self.code.line(f"{self.code.place(path)} = {function}(at{more})")
+        self.code.line(f"{self.code.place(path)} = {value}")
 
     def _many(self, leaf: Many) -> None:
         target, items, element = self.code.place(leaf.path), self.code.temp("l"), self.code.temp("e")
@@ -454,7 +459,7 @@ class _Reader(_Runs):
             self.code.line(line)
         self._at = loop(leaf.body, self._at if leaf.count else self._at.aligned(4).moved(4))
         if leaf.type_name in self._shared:
-            self.code.line(f"{self._shared.function('read', leaf.type_name)}({element}, buf, at)")
+            self.code.line(f"{self._shared.function('read', leaf.type_name)}({element}, at)")
         else:
             self._walk(leaf.body)
             self._flush()
@@ -474,17 +479,26 @@ class _Reader(_Runs):
     def _flush(self) -> None:
         if not self._run:
             return
-        place = f"part(at, {self._align}, {self._size()})"
-        self._align = 1
-        values = [width for chunk, _, width in self._run if chunk]
-        if not values:
-            self.code.line(place)
-            self._run = []
-        elif len(self._run) == 1 and not self._later:
-            self._get(place, unpack=False)
+        align, self._align = self._align, 1
+        if any(target for _, target, _ in self._run):
+            self._unpack(f'unpack(at, "{{}}", {align})')
         else:
-            self.code.line(f"p = {place}")
-            self._get("p", unpack=max(values) > 1)
+            self.code.line(f"part(at, 1, {len(self._run)})")
+            self._run = []
+
+
+def _bytewise(code: str) -> str:
+    """The code of numbers as they are packed: bools as bytes, since MicroPython packs no others."""
+    return "B" if code == "?" else code
+
+
+def _bools(values: str) -> str:
+    return f"list(map(bool, {values}))"
+
+
+def _is_texts(leaf: Many) -> bool:
+    """Whether it is a sequence of strings of any length."""
+    return leaf.body == (Text((), False, 0),) and not leaf.count
 
 
 def _stride(body: Sequence[Leaf]) -> tuple[int, int] | None:

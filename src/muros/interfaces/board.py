@@ -31,9 +31,19 @@ from muros.interfaces._names import split_type
 from muros.interfaces._registry import Registry
 
 _HELPERS = {
-    "muros.cdr": ("Fields", "block", "ended", "integer", "need"),
-    "muros.cdr_texts": ("count", "finish", "pad", "part", "put_count", "put_text", "text", "text_size"),
-    "muros.cdr_lists": ("list_size", "numbers", "put_numbers"),
+    "muros.cdr": ("Fields", "block", "ended", "integer", "need", "numbers"),
+    "muros.cdr_texts": (
+        "count",
+        "finish",
+        "pad",
+        "part",
+        "put_count",
+        "put_text",
+        "text",
+        "text_size",
+        "unpack",
+    ),
+    "muros.cdr_lists": ("list_size", "put_sequence", "sequence", "sequence_size"),
 }
 
 _PACKAGE = """\
@@ -197,6 +207,10 @@ class _Work:
         hidden = _hidden(message)
         for field in message.fields:
             name = attribute(field.name)
+            if zeros := _zeros(field):
+                arguments.append(f"{name}=None")
+                lines.append(_unshadowed(f"self.{name} = numbers({name}, {zeros})", hidden))
+                continue
             if field.type.nested or _made(field):
                 arguments.append(f"{name}=None")
                 filled = [f"if {name} is None:", *(f"    {line}" for line in values.filled(name, field))]
@@ -301,7 +315,7 @@ def _imports(body: str) -> list[str]:
     return lines
 
 
-_GLOBALS = frozenset({"Fields", "array", "bytes", "float", "range"})  # what constructors use
+_GLOBALS = frozenset({"Fields", "array", "bytes", "float", "numbers", "range"})  # what constructors use
 
 
 def _hidden(message: Message) -> set[str]:
@@ -337,7 +351,18 @@ def _made(field: Field) -> str:
         return f"[{zero!r}] * {field.type.count}" if _elements(field) else "[]"
     if field.default is not None:
         return f'array("{primitive.code}", {_literal(field.default)})'
-    return f'array("{primitive.code}", {f"bytes({_elements(field) * primitive.size})" if _elements(field) else "[]"})'
+    return f"numbers(None, {_zeros(field)})"
+
+
+def _zeros(field: Field) -> str:
+    """Code and bytes of an array that is zero or empty unless told otherwise; "" for other fields."""
+    if field.type.nested or field.type.kind is Kind.ONE or field.default is not None:
+        return ""
+    primitive = PRIMITIVES[field.type.base]
+    if primitive.code in ("B", "?") or not primitive.size:
+        return ""
+    size = _elements(field) * primitive.size
+    return f'"{primitive.code}", {size}' if size else f'"{primitive.code}"'
 
 
 def _elements(field: Field) -> int:
