@@ -46,6 +46,10 @@ class Sample:
         self.to: tuple[GuidPrefix, EntityId] | None = None
         """The only reader it is for; None = all."""
 
+    def is_for(self, reader: tuple[GuidPrefix, EntityId]) -> bool:
+        """Whether the reader shall get it."""
+        return self.to is None or self.to == reader
+
 
 class History:
     """Samples by sequence number. `depth`: samples kept of each instance, None for all."""

@@ -48,6 +48,11 @@ class ReaderProxy:
         self.repaired_at = 0
 
     @property
+    def key(self) -> tuple[GuidPrefix, EntityId]:
+        """The same in two parts, as events have it."""
+        return self.prefix, self.entity
+
+    @property
     def guid(self) -> Guid:
         """The reader's GUID."""
         return guid_of(self.prefix, self.entity)

@@ -1,13 +1,16 @@
-"""How much leaves a writer at once: an allowance of bytes, and submessages that share a datagram."""
+"""How samples become submessages, and how much of them leaves a writer at once: an allowance of bytes, a window of what
+is on its way, and submessages that share a datagram."""
 
+from collections.abc import Iterable, Iterator
 from typing import Final
 
-from muros.rtps._endpoint import Send
+from muros.rtps._endpoint import Place, Send
+from muros.rtps._history import Sample
 from muros.rtps._reader_proxy import ReaderProxy
 from muros.rtps._values import EntityId
-from muros.rtps._wire import gap, split_numbers
+from muros.rtps._wire import data, data_frag, gap, info_dst, split_numbers
 
-__all__ = ["Allowance", "Packet", "Window", "gaps"]
+__all__ = ["Allowance", "Packet", "Window", "data_of", "fragment_of", "gaps", "skips_of"]
 
 OVERHEAD: Final = 768
 """Bytes that a sample counts for besides its own: receivers' buffers hold more than what is sent."""
@@ -20,6 +23,9 @@ WINDOW_FIRST: Final = 192 * 1024
 
 GROWTH: Final = 8
 """The window grows by this part of what arrives."""
+
+SKIPS_MOST: Final = 24
+"""GAPs to several readers at one place that share a datagram."""
 
 CHECKPOINTS_MOST: Final = 64
 """Samples remembered that have asked for acknowledgement; of more the newest stands for those before it."""
@@ -169,3 +175,33 @@ def gaps(reader: EntityId, writer: EntityId, gone: list[int]) -> list[bytes]:
             end += 1
         submessages.append(gap(reader, writer, base, end, numbers[end - base :]))
     return submessages
+
+
+def data_of(sample: Sample, reader: EntityId, writer: EntityId) -> bytes:
+    """The DATA of a sample that fits one."""
+    return data(reader, writer, sample.sequence, sample.payload, inline_qos=sample.inline_qos, key=sample.key)
+
+
+def fragment_of(sample: Sample, number: int, size: int, reader: EntityId, writer: EntityId) -> bytes:
+    """The DATA_FRAG with one fragment of a sample, all of `size` bytes but the last; `number` counts from 1."""
+    payload = sample.payload
+    part = payload[(number - 1) * size : number * size]
+    return data_frag(
+        reader, writer, sample.sequence, number, 1, size, len(payload), part,
+        inline_qos=sample.inline_qos, key=sample.key,
+    )  # fmt: skip
+
+
+def skips_of(
+    sample: Sample, proxies: Iterable[ReaderProxy], writer: EntityId
+) -> Iterator[tuple[Place, list[bytes]]]:
+    """GAPs that tell all reliable readers but the one a sample is for not to wait for it: by place, a datagram each."""
+    told: dict[Place, list[bytes]] = {}
+    for proxy in proxies:
+        if proxy.reliable and not sample.is_for(proxy.key):
+            skip = gap(proxy.entity, writer, sample.sequence, sample.sequence + 1)
+            for place in proxy.places:
+                told.setdefault(place, []).append(info_dst(proxy.prefix) + skip)
+    for place, skips in told.items():
+        for start in range(0, len(skips), SKIPS_MOST):
+            yield place, skips[start : start + SKIPS_MOST]

@@ -26,20 +26,11 @@ from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, newer
 from muros.rtps._fragments import fragments_of
 from muros.rtps._history import History, Sample
 from muros.rtps._reader_proxy import ReaderProxy
-from muros.rtps._sending import OVERHEAD, WINDOW_LEAST, Allowance, Packet, Window, gaps
+from muros.rtps._repairs import Repairs
+from muros.rtps._sending import OVERHEAD, WINDOW_LEAST, Allowance, Window, data_of, fragment_of, skips_of
 from muros.rtps._settings import WRITER_DEFAULTS, WriterSettings
 from muros.rtps._values import EntityId, Guid, GuidPrefix, split_guid
-from muros.rtps._wire import (
-    MAX_SUBMESSAGE,
-    AckNack,
-    NackFrag,
-    data,
-    data_frag,
-    gap,
-    heartbeat,
-    info_dst,
-    info_ts,
-)
+from muros.rtps._wire import MAX_SUBMESSAGE, AckNack, NackFrag, heartbeat, info_dst, info_ts
 
 __all__ = ["WriterCore"]
 
@@ -49,18 +40,11 @@ FRAGMENT_HEAD: Final = 32
 SENTINEL_SIZE: Final = 4
 """Bytes of the mark at the end of a parameter list."""
 
-WANTED_MOST: Final = 512
-"""Samples waiting to be sent again to one reader; what it asks for beyond, it will ask for again."""
-
 ASK_LEAST: Final = 8
 """A writer that keeps few samples asks for acknowledgement this often, in samples, ..."""
 
 ASK_MOST: Final = 64
 """... and one that keeps many this often."""
-
-
-SKIPS_MOST: Final = 24
-"""GAPs to several readers at one place that share a datagram."""
 
 LARGE: Final = 8192
 """Bytes from which on a sample is held back when too much is on its way, though newer ones may push it out."""
@@ -88,7 +72,7 @@ class WriterCore:
     __slots__ = (
         "_allowance", "_ask_at", "_ask_every", "_count", "_cursor", "_endpoint_qos", "_entity",
         "_history", "_idle", "_lagging", "_leaving", "_lifespan", "_on_room", "_proxies", "_refused",
-        "_reliable", "_repairing", "_report", "_retains", "_routes", "_send", "_unasked", "_unsent",
+        "_reliable", "_repairs", "_report", "_retains", "_routes", "_send", "_unasked", "_unsent",
         "_window", "_with_qos", "due", "guid", "last", "reliable", "sent", "settings",
     )  # fmt: skip
 
@@ -127,13 +111,15 @@ class WriterCore:
         self._reliable = 0  # how many of them are reliable
         self._idle: dict[ReaderProxy, None] = {}  # those that have everything
         self._lagging: dict[ReaderProxy, None] = {}  # those that do not
-        self._repairing: dict[ReaderProxy, None] = {}  # those that want something again
         self._routes: tuple[Place, ...] = ()  # every place where a reader listens, once
         self._unsent: list[int] = []  # samples waiting to leave
         self._leaving: Sample | None = None  # the first of them, when part of it has left:
         self._cursor = 0  # so many of its fragments
         self._allowance = Allowance(settings.burst, settings.pace)
         self._window = Window(settings.window)
+        self._repairs = Repairs(
+            self._entity, send, self._history, self._allowance, settings.fragment_size, settings.hold_off
+        )
         self._count = 0
         self._ask_at = 0
         kept = settings.limit if depth is None else max(depth, ASK_LEAST * 4)
@@ -206,8 +192,9 @@ class WriterCore:
         proxy = self._proxies.pop(split_guid(reader), None)
         if proxy is None:
             return
-        for proxies in (self._idle, self._lagging, self._repairing):
-            proxies.pop(proxy, None)
+        self._idle.pop(proxy, None)
+        self._lagging.pop(proxy, None)
+        self._repairs.drop(proxy)
         self._reroute()
         if not self._lagging:
             self._window.reset(now)
@@ -285,8 +272,12 @@ class WriterCore:
         progress = acked > proxy.acked
         if progress:
             self._advance(proxy, acked, now)
-        repairs = bool(event.missing) and self._want(proxy, event, now)
-        if repairs:
+        answered = missed = False
+        if event.missing:
+            answered, missed = self._repairs.want(proxy, event, self._lowest(), self.sent, now)
+        if missed:
+            self._lost(now)
+        if answered:
             self._repair(now)
         elif not event.final:
             # One that is not final asks for an answer. The answer must not ask back when nothing has changed:
@@ -308,25 +299,10 @@ class WriterCore:
         if proxy is None or not proxy.reliable or not newer(event.count, proxy.fragment_count):
             return
         proxy.fragment_count = event.count
-        number = event.sequence
-        if (
-            not proxy.acked < number <= self.sent
-            or number in proxy.wanted
-            or len(proxy.wanted) >= WANTED_MOST
-        ):
-            return
-        sample = self._history.get(number)
-        if sample is not None and sample.to in (None, (proxy.prefix, proxy.entity)):
-            total = fragments_of(len(sample.payload), self.settings.fragment_size)
-            fragments = [fragment for fragment in event.missing if 1 <= fragment <= total]
-            if not fragments:
-                return
-            proxy.wanted[number] = fragments
-            self._lost(now)
-        else:
-            proxy.wanted[number] = None  # becomes a GAP
-        self._repairing[proxy] = None
-        self._repair(now)
+        if proxy.acked < event.sequence <= self.sent:
+            if self._repairs.want_fragments(proxy, event):
+                self._lost(now)
+            self._repair(now)
 
     def assert_liveliness(self, now: int) -> None:
         """Say that a writer with manual liveliness is alive (8.3.7.5: HEARTBEAT with the liveliness flag)."""
@@ -350,7 +326,7 @@ class WriterCore:
             self._tell_room()
         self.due = min((proxy.due for proxy in self._lagging), default=NEVER)
         self.due = min(self.due, expires)
-        if self._unsent or self._repairing:
+        if self._unsent or self._repairs.waiting:
             self.due = min(self.due, now + self.settings.pace)
         if self._refused:
             self.due = min(self.due, self._patience_ends())
@@ -364,15 +340,7 @@ class WriterCore:
             self._transmit_to(sample, now)
             return
         self.sent = sample.sequence
-        content = data(
-            ENTITYID_UNKNOWN,
-            self._entity,
-            self.sent,
-            sample.payload,
-            inline_qos=sample.inline_qos,
-            key=sample.key,
-        )
-        submessages = [sample.stamp, content]
+        submessages = [sample.stamp, data_of(sample, ENTITYID_UNKNOWN, self._entity)]
         if self._reliable:
             submessages += self._expect_and_ask(len(sample.payload), now)
         send = self._send
@@ -385,26 +353,16 @@ class WriterCore:
         beat = self._expect_and_ask(len(sample.payload), now)
         proxy = self._proxies.get(sample.to) if sample.to else None
         if proxy is not None:
-            content = data(
-                proxy.entity, self._entity, sample.sequence, sample.payload,
-                inline_qos=sample.inline_qos, key=sample.key,
-            )  # fmt: skip
+            submessages = [sample.stamp, data_of(sample, proxy.entity, self._entity), *beat]
             for place in proxy.places:
-                self._send([sample.stamp, content, *beat], proxy.prefix, place)
+                self._send(submessages, proxy.prefix, place)
         self._skip(sample, beat)
 
     def _skip(self, sample: Sample, beat: list[bytes]) -> None:
         """Tell all but the one a sample is for that it is not for them."""
-        told: dict[Place, list[bytes]] = {}
-        for key, proxy in self._proxies.items():
-            if proxy.reliable and key != sample.to:
-                skip = gap(proxy.entity, self._entity, sample.sequence, sample.sequence + 1)
-                for place in proxy.places:
-                    told.setdefault(place, []).append(info_dst(proxy.prefix) + skip)
         everybody = [info_dst(EVERYBODY), *beat] if beat else []
-        for place, skips in told.items():
-            for start in range(0, len(skips), SKIPS_MOST):
-                self._send(skips[start : start + SKIPS_MOST] + everybody, None, place)
+        for place, submessages in skips_of(sample, self._proxies.values(), self._entity):
+            self._send(submessages + everybody, None, place)
 
     def _pump(self, now: int) -> None:
         """Send what waits, as far as the allowance goes."""
@@ -447,7 +405,8 @@ class WriterCore:
                     return False
                 self._allowance.spend(size * len(places))
             self._cursor += 1
-            submessages = [sample.stamp, self._fragment(reader, sample, self._cursor)]
+            content = fragment_of(sample, self._cursor, size, reader, self._entity)
+            submessages = [sample.stamp, content]
             if self._cursor == total:
                 self.sent = sample.sequence
                 if self._reliable:
@@ -462,55 +421,11 @@ class WriterCore:
 
     def _repair(self, now: int) -> None:
         """Send again what readers want, to them alone, as far as the allowance goes."""
-        for proxy in tuple(self._repairing):
-            packet = Packet(self._send, proxy, self.settings.fragment_size)
-            gone: list[int] = []
-            while proxy.wanted and self._may_send(now):
-                number = next(iter(proxy.wanted))
-                fragments = proxy.wanted.pop(number)
-                sample = self._history.get(number)
-                if sample is None or sample.to not in (None, (proxy.prefix, proxy.entity)):
-                    gone.append(number)
-                    continue
-                if len(sample.payload) + len(sample.inline_qos) <= packet.size:
-                    content = data(
-                        proxy.entity, self._entity, number, sample.payload,
-                        inline_qos=sample.inline_qos, key=sample.key,
-                    )  # fmt: skip
-                    packet.add(sample.stamp, content)
-                    self._allowance.spend(len(content) * len(proxy.places))
-                else:
-                    self._repair_fragments(packet, proxy, sample, fragments, now)
-            for submessage in gaps(proxy.entity, self._entity, sorted(gone)):
-                packet.add(submessage)
-            if not proxy.wanted:
-                self._repairing.pop(proxy, None)
-                packet.add(self._heartbeat(proxy, final=False))
-            packet.flush()
-        if self._repairing:
-            self.due = min(self.due, now + self.settings.pace)
-
-    def _repair_fragments(
-        self, packet: Packet, proxy: ReaderProxy, sample: Sample, fragments: Iterable[int] | None, now: int
-    ) -> None:
-        """Send fragments again, None = all; those beyond the allowance go back to what is wanted."""
-        if fragments is None:
-            fragments = range(1, fragments_of(len(sample.payload), packet.size) + 1)
-        numbers = iter(fragments)
-        for number in numbers:
-            if not self._may_send(now):
-                proxy.wanted = {sample.sequence: [number, *numbers], **proxy.wanted}
-                return
-            packet.add(sample.stamp, self._fragment(proxy.entity, sample, number))
-            self._allowance.spend(packet.size * len(proxy.places))
-
-    def _fragment(self, reader: EntityId, sample: Sample, number: int) -> bytes:
-        payload, size = sample.payload, self.settings.fragment_size
-        part = payload[(number - 1) * size : number * size]
-        return data_frag(
-            reader, self._entity, sample.sequence, number, 1, size, len(payload), part,
-            inline_qos=sample.inline_qos, key=sample.key,
-        )  # fmt: skip
+        repairs = self._repairs
+        if repairs.waiting:
+            repairs.run(now, self._asking_heartbeat)
+            if repairs.waiting:
+                self.due = min(self.due, now + self.settings.pace)
 
     def _paces(self, sample: Sample) -> bool:
         """Whether the window counts for a sample.
@@ -564,6 +479,9 @@ class WriterCore:
         first = max(self._lowest(), proxy.start)
         return heartbeat(proxy.entity, self._entity, first, self.sent, self._count, final=final)
 
+    def _asking_heartbeat(self, proxy: ReaderProxy) -> bytes:
+        return self._heartbeat(proxy, final=False)
+
     def _send_heartbeat(self, proxy: ReaderProxy, *, final: bool) -> None:
         beat = self._heartbeat(proxy, final=final)
         for place in proxy.places:
@@ -612,40 +530,11 @@ class WriterCore:
             del proxy.wanted[number]
         if acked == self.sent:
             self._lagging.pop(proxy, None)
-            self._repairing.pop(proxy, None)
+            self._repairs.drop(proxy)
             proxy.due = NEVER
             self._idle[proxy] = None
         else:
             self._now_lags(proxy, now)
-
-    def _want(self, proxy: ReaderProxy, event: AckNack, now: int) -> bool:
-        """Queue what a reader misses; False when nothing of it is to be sent (again) now."""
-        if now - proxy.repaired_at >= self.settings.hold_off:
-            proxy.repaired.clear()
-            proxy.repaired_at = now
-        lowest = max(proxy.start, self._lowest())
-        repaired, wanted = proxy.repaired, proxy.wanted
-        before = len(wanted)
-        gap_sent = False
-        for number in event.missing:
-            if number > self.sent:
-                break
-            if number < lowest:
-                if 0 not in repaired:
-                    repaired.add(0)
-                    gap_sent = True
-                    skip = gap(proxy.entity, self._entity, max(event.base, 1), lowest)
-                    for place in proxy.places:
-                        self._send([skip], proxy.prefix, place)
-            elif number not in repaired and number not in wanted and len(wanted) < WANTED_MOST:
-                repaired.add(number)
-                wanted[number] = None
-        if len(wanted) > before:
-            self._lost(now)
-        if len(wanted) > before or gap_sent:
-            self._repairing[proxy] = None
-            return True
-        return False
 
     def _lost(self, now: int) -> None:
         """Readers miss something: send less at once."""
