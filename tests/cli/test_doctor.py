@@ -22,6 +22,7 @@ def _no_agent(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever runs on this host: there is no agent, unless a test starts one."""
     monkeypatch.setattr(_host_checks, "_agent_answers", lambda host, port: False)
     monkeypatch.setattr(_host_checks, "port_holder", lambda protocol, port: None)
+    monkeypatch.setattr(_graph_checks, "domains_in_use", list)
 
 
 def test_nobody_is_there() -> None:
@@ -32,6 +33,29 @@ def test_nobody_is_there() -> None:
         assert done.status == 0
 
     play(scenario)
+
+
+def test_nobody_is_there_but_in_another_domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_graph_checks, "domains_in_use", lambda: [0, 5, 7])
+
+    async def scenario(scene: Scene) -> None:
+        done = await scene.muros("doctor")
+        assert (
+            "note   nobody else is in domain 0, but processes of this host are in domain 5, 7\n"
+            "       -> muros doctor -d 5 looks there; ROS_DOMAIN_ID=5 takes all commands there\n"
+        ) in done.out
+
+    play(scenario)
+
+
+def test_domains_in_use_are_read_off_the_ports() -> None:
+    head = "  sl  local_address rem_address   st tx_queue rx_queue\n"
+    rows = "".join(
+        f" {n}: 0100007F:{port:04X} 00000000:0000 07 00000000:00000000\n"
+        for n, port in enumerate((7400, 7410, 7400 + 250 * 42, 68))
+    )
+    assert _host_checks.domains_in_use(head + rows) == [0, 42]
+    assert _host_checks.domains_in_use("") == []
 
 
 def test_all_is_well() -> None:

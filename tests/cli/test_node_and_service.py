@@ -30,6 +30,14 @@ def test_node_list() -> None:
     play(scenario)
 
 
+def test_names_from_others_cannot_command_the_terminal() -> None:
+    async def scenario(scene: Scene) -> None:
+        scene.space.participant("a\x1b[2Jb\u202ec")
+        assert (await scene.muros("node list")).out == "/a\\x1b[2Jb\\u202ec\n"
+
+    play(scenario)
+
+
 def test_node_info() -> None:
     async def scenario(scene: Scene) -> None:
         scene.writer("/ns/talker", "/chatter", STRING)

@@ -6,7 +6,7 @@ import pytest
 
 from muros import interfaces
 from muros.cli import _rates
-from muros.space import Durability, Qos, Reliability, Topic
+from muros.space import CDR_BE, Durability, Qos, Reliability, Topic
 from tests.cli.scene import Scene, parse, play
 
 STRING = "std_msgs/msg/String"
@@ -258,6 +258,21 @@ def test_echo_learns_types_from_a_folder(tmp_path_factory: pytest.TempPathFactor
         await scene.until(lambda: writer.matched)
         writer.write(b"\x07\0\0\0\x03\0\0\0ok\0")
         assert (await echo.end()).out == "level: 7\nnote: ok\n---\n"
+
+    play(scenario)
+
+
+def test_echo_reads_big_endian_and_says_what_it_cannot_read() -> None:
+    async def scenario(scene: Scene) -> None:
+        writer = scene.writer("/talker", "/x", "std_msgs/msg/Int32")
+        echo = scene.start("topic echo /x --times 3")
+        await scene.until(lambda: writer.matched)
+        writer.write(b"\0\0\0\5", representation=CDR_BE)
+        writer.write(b"\5\0\0\0", representation=7)
+        writer.write(b"\5\0\0\0", representation=7)
+        done = await echo.end()
+        assert done.out.startswith("data: 5\n---\n00000000  05 00 00 00  ")
+        assert done.err == "muros: samples are encoded as 0x0007, which is no plain CDR; here are the bytes\n"
 
     play(scenario)
 

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
+from muros.cli._tool import printable
+
 __all__ = ["Level", "Result", "fine", "note", "report", "wrong"]
 
 
@@ -46,12 +48,11 @@ def report(results: Iterable[Result]) -> str:
     """The lines for one result after the other."""
     lines = []
     for result in results:
-        lines.append(f"{result.level.value:<6} {_shown(result.what)}")
+        lines.append(f"{result.level.value:<6} {_one_line(result.what)}")
         if result.remedy:
-            lines.append(f"{'':<6} -> {_shown(result.remedy)}")
+            lines.append(f"{'':<6} -> {_one_line(result.remedy)}")
     return "\n".join(lines)
 
 
-def _shown(text: str) -> str:
-    """Names come from others: control characters in them are shown escaped."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+def _one_line(text: str) -> str:
+    return printable(text).replace("\n", "\\n").replace("\t", "\\t")

@@ -157,7 +157,7 @@ class _Printer:
         self._filter = expression(arguments.filter_expr)
         self._left = 1 if arguments.once else arguments.times
         self._shown = 0
-        self._bad = 0
+        self._excused = False
         self._look = Look(
             None if arguments.full_length else max(arguments.truncate_length, 0),
             arguments.no_arr,
@@ -182,15 +182,16 @@ class _Printer:
         arguments = self._arguments
         info = _info(sample, self._shown + 1) if arguments.include_message_info else None
         head = "" if info is None else dump(info) + "---\n"
-        if self._made is None or sample.representation not in (CDR_LE, CDR_BE):
-            return f"{head}{hex_dump(sample.data, self._look.truncate)}---\n"
+        if self._made is None:
+            return f"{head}{self._bytes(sample)}"
+        if sample.representation not in (CDR_LE, CDR_BE):
+            self._excuse(f"samples are encoded as 0x{sample.representation:04x}, which is no plain CDR")
+            return f"{head}{self._bytes(sample)}"
         try:
             value = decoded(self._made, sample)
         except interfaces.CdrError as error:
-            self._bad += 1
-            if self._bad == 1:
-                self._tool.say(f"{error}; is it another version of {self._type_name}? Here are the bytes")
-            return f"{head}{hex_dump(sample.data, self._look.truncate)}---\n"
+            self._excuse(f"{error}; is it another version of {self._type_name}?")
+            return f"{head}{self._bytes(sample)}"
         if arguments.field:
             value = pick(value, arguments.field)
         if self._filter is not None and not self._filter(value):
@@ -199,6 +200,15 @@ class _Printer:
             times = "" if info is None else ",".join(str(v) for v in info.values()) + ","
             return f"{times}{to_csv(value, self._look)}\n"
         return f"{head}{to_yaml(value, self._look)}---\n"
+
+    def _bytes(self, sample: Sample) -> str:
+        return f"{hex_dump(sample.data, self._look.truncate)}---\n"
+
+    def _excuse(self, why: str) -> None:
+        """Say once why there are bytes instead of values."""
+        if not self._excused:
+            self._excused = True
+            self._tool.say(f"{why} Here are the bytes" if why.endswith("?") else f"{why}; here are the bytes")
 
 
 UNKNOWN = "a type without a definition here: say --types FOLDER (it holds package/msg/Type.msg)"

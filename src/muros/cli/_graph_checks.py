@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from muros import interfaces
 from muros.cli._diagnosis import Result, fine, note, wrong
+from muros.cli._host_checks import domains_in_use
 from muros.cli._names import RosTopic, node_name, ros_services, ros_topics
 from muros.cli.graph import is_noise
 from muros.cli.node import nodes_of
@@ -31,6 +32,13 @@ def graph_checks(tool: Tool) -> Iterator[Result]:
     own = tool.participant.gid
     others = [p for p in tool.graph.participants if p.domain == tool.domain and p.gid != own]
     if not others:
+        busy = [str(d) for d in domains_in_use() if d != tool.domain]
+        if busy:
+            yield note(
+                f"nobody else is in domain {tool.domain}, but processes of this host are in domain {', '.join(busy)}",
+                f"muros doctor -d {busy[0]} looks there; ROS_DOMAIN_ID={busy[0]} takes all commands there",
+            )
+            return
         yield note(
             f"nobody else is in domain {tool.domain}",
             "If somebody should be: the same ROS_DOMAIN_ID there? The same network, without a firewall between?",

@@ -18,11 +18,13 @@ from muros.links._hosts import port_holder
 from muros.rtps.net import Interface, NetworkError, NetworkSettings, Range
 from muros.rtps.net._interfaces import interfaces
 
-__all__ = ["agent_check", "host_checks"]
+__all__ = ["agent_check", "domains_in_use", "host_checks"]
 
 PORT_BASE: Final = 7400
 DOMAIN_GAIN: Final = 250
 """DDSI-RTPS 2.3, 9.6.1.1: the ports of a domain begin at 7400 + 250 * domain."""
+
+MAX_DOMAIN: Final = 232
 
 PROBE_TIME: Final = 0.4
 """Seconds in which our own multicast must come back, and an agent on this host must answer."""
@@ -193,6 +195,17 @@ def port_check(domain: int) -> Result:
                 f"Stop it, or choose another domain with ROS_DOMAIN_ID or -d ({PORT_BASE} + {DOMAIN_GAIN} x domain)",
             )
     return fine(f"port udp {port} (discovery in domain {domain}) can be used")
+
+
+def domains_in_use(table: str | None = None) -> list[int]:
+    """The domains in which some process of this host listens for others, by their discovery ports (Linux)."""
+    text = _read(Path("/proc/net/udp")) if table is None else table
+    ports = {
+        int(words[1].rpartition(":")[2], 16)
+        for line in text.splitlines()[1:]
+        if len(words := line.split()) > 1
+    }
+    return [d for d in range(MAX_DOMAIN + 1) if PORT_BASE + DOMAIN_GAIN * d in ports]
 
 
 def buffer_check(wanted: int, granted: str | None = None) -> Result:

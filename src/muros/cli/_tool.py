@@ -11,6 +11,7 @@ import argparse
 import asyncio
 import contextlib
 import os
+import re
 import signal
 import sys
 import time
@@ -20,7 +21,16 @@ from typing import TYPE_CHECKING, Final, TextIO
 if TYPE_CHECKING:
     from muros.space import Endpoint, Graph, Participant, Qos, Reader, Sample, Space, Topic
 
-__all__ = ["CommandError", "Subscription", "Tool", "add_space_options", "fail", "positive", "run_command"]
+__all__ = [
+    "CommandError",
+    "Subscription",
+    "Tool",
+    "add_space_options",
+    "fail",
+    "positive",
+    "printable",
+    "run_command",
+]
 
 FAILED: Final = 1
 WRONG_USE: Final = 2
@@ -37,6 +47,10 @@ PATIENCE: Final = 4
 
 HIDDEN_NODE: Final = "_muros_"
 """Names of the commands' own nodes begin so: as all that begin with an underscore, they are not listed."""
+
+
+_CONTROL: Final = re.compile(r"[\0-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+"""Control characters, and those that turn the direction of writing."""
 
 
 class CommandError(Exception):
@@ -95,14 +109,14 @@ class Tool:
 
     def print(self, text: object = "", end: str = "\n") -> None:
         """A result, at once: whoever reads a pipe sees each sample when it comes."""
-        print(text, end=end, file=self._out or sys.stdout, flush=True)
+        print(printable(str(text)), end=end, file=self._out or sys.stdout, flush=True)
 
     def say(self, text: object) -> None:
         """A remark for the person, not part of the result."""
         err = self._err or sys.stderr
         if err is sys.stderr:
             sys.stdout.flush()
-        print(f"muros: {text}", file=err, flush=True)
+        print(f"muros: {printable(str(text))}", file=err, flush=True)
 
     async def discover(self, until: Callable[[Graph], bool] | None = None) -> None:
         """Wait until the graph is known as far as it goes, for about `spin_time`; at once when `until` says so.
@@ -244,8 +258,13 @@ def run_command(
 
 def fail(error: object, status: int = FAILED) -> int:
     """Say what went wrong in one line; returns the status to end with."""
-    print(f"muros: {error}", file=sys.stderr)
+    print(f"muros: {printable(str(error))}", file=sys.stderr)
     return status
+
+
+def printable(text: str) -> str:
+    """`text` with control characters escaped, but line ends and tabs: names come from others."""
+    return _CONTROL.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 def positive(text: str) -> float:

@@ -107,13 +107,13 @@ def pick(message: Any, path: str) -> Any:
             if step.startswith("["):
                 value = value[int(step[1:].rstrip("]"))]
             else:
-                value = getattr(value, interfaces_attribute(value, step))
+                value = getattr(value, _attribute(value, step))
         except (AttributeError, IndexError, TypeError, ValueError, KeyError):
             raise CommandError(f"--field {path}: {_no_step(value, step)}") from None
     return value
 
 
-def interfaces_attribute(message: Any, field: str) -> str:
+def _attribute(message: Any, field: str) -> str:
     """The Python attribute of a field. KeyError if the message has no such field."""
     return str(dict(zip(message._FIELDS, message.__slots__, strict=True))[field])
 
@@ -199,7 +199,7 @@ def _fill(message: Any, values: Any, path: str, stamps: list[Stamp]) -> None:
             raise CommandError(f"{message.TYPE} has no field {str(name)!r}{_close(str(name), types)}")
         if given is None:
             continue
-        attribute = interfaces_attribute(message, name)
+        attribute = _attribute(message, name)
         here = f"{path}.{name}" if path else str(name)
         setattr(message, attribute, _value(types[name], given, here, stamps))
 
