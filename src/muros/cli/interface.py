@@ -124,7 +124,8 @@ def _list(arguments: argparse.Namespace) -> None:
         found = {name.partition("/")[0] for name in names}
     chosen = set(arguments.packages) or found
     lines = sorted(chosen) if arguments.names_only else [n for n in names if n.partition("/")[0] in chosen]
-    print("\n".join(lines))
+    if lines:
+        print("\n".join(lines))
 
 
 def _proto(arguments: argparse.Namespace) -> None:
