@@ -214,6 +214,8 @@ def test_a_space_that_the_program_s_own_loop_serves() -> None:
                 await asyncio.sleep(0)
             with pytest.raises(RclError, match=r"waiting would stop the asyncio loop.*await asyncio.sleep"):
                 executor.spin()
+            with pytest.raises(RclError, match="Make the context in the thread of that loop"):
+                await asyncio.to_thread(Context, space)
             one.close()
             other.close()
             assert not space.closed

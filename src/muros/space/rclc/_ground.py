@@ -6,6 +6,7 @@ last of them. A space that was given is the giver's: contexts leave it, and tell
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -20,15 +21,25 @@ __all__ = ["Ground"]
 
 
 class Ground:
-    """A space and the contexts on it. `owned`: it is closed with the last of them. `on_gone` is called then."""
+    """A space that is attached to `loop`, and the contexts on it.
+
+    `owned`: it is closed with the last of them; `on_gone` is called then.
+    """
 
     def __init__(
-        self, space: Space, server: Server, on_gone: Callable[[], object], *, owned: bool, served: bool
+        self,
+        space: Space,
+        server: Server,
+        loop: asyncio.AbstractEventLoop,
+        on_gone: Callable[[], object],
+        *,
+        owned: bool,
     ) -> None:
         self.space = space
         self.server = server
         self.owned = owned
-        self.served = served
+        self.loop = loop
+        self.served = served = loop is server.loop
         """Whether we serve it; else the asyncio loop of this thread does, and nobody here can wait."""
         self.contexts: list[SpaceMiddleware] = []
         self._on_gone = on_gone

@@ -21,6 +21,8 @@ __all__ = ["open_way"]
 LARGEST_DOMAIN: Final = 232
 """The ports of a larger one do not exist (DDSI-RTPS 2.3, 9.6.1.1)."""
 
+_ELSEWHERE: Final = "Make the context in the thread of that loop, or give it a space of its own"
+
 _grounds: Final[dict[object, Ground]] = {}
 """By URL with the domain, or by the identity of a space that was given."""
 
@@ -39,6 +41,8 @@ def open_way(way: str | Space, domain: int | None = None) -> SpaceMiddleware:
         if ground is None:
             assert not isinstance(way, str)
             ground = _grounds[id(way)] = _prepare(way, id(way), owned=False)
+        elif not ground.served and ground.loop is not asyncio._get_running_loop():
+            raise RclError(f"the space is attached to another event loop. {_ELSEWHERE}")
         return SpaceMiddleware(ground, ground.space.domain if domain is None else domain)
 
 
@@ -86,15 +90,13 @@ def _prepare(space: Space, key: object, *, owned: bool) -> Ground:
             except SpaceError as error:
                 reason = str(error)
                 continue
-            return Ground(space, serving, forget, owned=owned, served=loop is serving.loop)
+            return Ground(space, serving, loop, forget, owned=owned)
     finally:
         serving.release()
     if owned:
         space.close()
         raise RclError(reason)
-    raise RclError(
-        f"{reason.rstrip('.')}. Make the context in the thread of that loop, or give it a space of its own"
-    )
+    raise RclError(f"{reason.rstrip('.')}. {_ELSEWHERE}")
 
 
 def _goodbye() -> None:
