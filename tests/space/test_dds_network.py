@@ -84,6 +84,20 @@ class TestTopics:
             assert sample.data == body[:size]
             assert (sample.writer_gid, sample.source_time) == (writer.gid, sent)
 
+    @pytest.mark.parametrize("time", [-1, 0, 5, 2**62, 2**70])
+    def test_boards_may_say_any_time(self, time: int) -> None:
+        net = Net()
+        one, two = net.computer(), net.computer()
+        writer = one.space.participant("talker").writer(CHATTER, RELIABLE)
+        reader = two.space.participant("listener").reader(CHATTER, RELIABLE)
+        net.until(lambda: writer.matched and reader.matched)
+        now = net.clock()
+        assert writer.write(b"x", source_time=time)
+        net.run()
+        sample = reader.take()
+        assert sample is not None
+        assert sample.source_time == (time if time in (0, 5) else now)
+
     def test_who_comes_late_gets_what_is_kept(self) -> None:
         net = Net(loss=0.1)
         one, two = net.computer(), net.computer()
@@ -299,6 +313,43 @@ class TestServices:
         net.run()
         assert answers == [b"xx", b"xx"]
         assert two.codes == ["several-servers"]
+
+    def test_who_merely_listens_is_neither_server_nor_client(self) -> None:
+        net = Net()
+        one, two = net.computer(), net.computer()
+        ear = one.space.participant("ear")
+        for topic in (
+            Topic(ADD.request_topic, ADD.request_type),
+            Topic(ADD.reply_topic, ADD.reply_type),
+        ):
+            ear.reader(topic, RELIABLE)
+        client = two.space.participant("client").requester(ADD)
+        net.run(SECOND)
+        assert client.servers == 0
+        service = two.graph.service("/add_two_ints")
+        assert service is not None
+        assert (service.servers, len(service.clients)) == ((), 1)
+        ours = one.graph.service("/add_two_ints")
+        assert ours is not None
+        assert [each.gid for each in ours.clients] == [each.gid for each in service.clients] == [client.gid]
+
+    def test_a_server_that_keeps_all_loses_no_reply(self) -> None:
+        """A writer that is full puts replies off until there is room."""
+        net = Net()
+        one, two = (net.computer(resource_limit=8, max_blocking_time=20 * SECOND) for _ in range(2))
+        made: list[Replier] = []
+        made.append(one.space.participant("server").replier(ADD, KEEP_ALL, echo(made)))
+        client = two.space.participant("client").requester(ADD, KEEP_ALL)
+        net.until(lambda: client.servers == 1)
+        answers: list[bytes] = []
+        for i in range(20):
+            client.send(numbered(i))
+            net.run(20 * MS)
+        for _ in range(20):
+            net.run(100 * MS)
+            while (reply := client.take()) is not None:
+                answers.append(reply.data)
+        assert sorted(answers) == sorted(numbered(i) * 2 for i in range(20))
 
 
 class _CycloneServer:

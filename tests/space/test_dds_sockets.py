@@ -139,6 +139,8 @@ def test_opening(monkeypatch: pytest.MonkeyPatch) -> None:
         open_space("dds:9999")
     with pytest.raises(TypeError, match="no option colour"):
         open_space("dds:1", colour=1)
+    with pytest.raises(SpaceError, match="nearest of foxy, galactic, humble"):
+        open_space("dds:1", ros_distro="humbel")
     with pytest.raises(SpaceError, match="RANGE"):
         open_space("dds:1", range="FAR")
     with open_space("dds:1") as space:

@@ -62,6 +62,9 @@ class TestOpening:
             assert (space.url, space.domain) == ("local:42", 42)
             assert space.participant("a").domain == 42
             assert space.participant("b", domain=0).domain == 0
+            space.participant("c").writer(CHATTER)
+            assert space.graph.topic(CHATTER.name) == space.graph.topic(CHATTER.name, 42) is not None
+            assert space.graph.topic(CHATTER.name, 0) is None
         with open_space() as space:
             assert (space.url, space.domain) == ("local:", 0)
 

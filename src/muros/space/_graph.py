@@ -173,11 +173,11 @@ class Graph(Protocol):
     def services(self) -> tuple[ServiceInfo, ...]:
         """All services with a server or client."""
 
-    def topic(self, name: str, domain: int = 0) -> TopicInfo | None:
-        """One topic, None if nobody writes or reads it."""
+    def topic(self, name: str, domain: int | None = None) -> TopicInfo | None:
+        """One topic, None if nobody writes or reads it. `domain` None = that of the space."""
 
-    def service(self, name: str, domain: int = 0) -> ServiceInfo | None:
-        """One service, None if nobody serves or uses it."""
+    def service(self, name: str, domain: int | None = None) -> ServiceInfo | None:
+        """One service, None if nobody serves or uses it. `domain` None = that of the space."""
 
     def endpoint(self, gid: bytes) -> Endpoint | None:
         """The writer or reader with this gid."""

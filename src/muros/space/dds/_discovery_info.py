@@ -16,6 +16,7 @@ __all__ = [
     "GID_SIZE_OLD",
     "INFO_QOS",
     "INFO_TOPIC",
+    "NEW_DISTROS",
     "OLD_DISTROS",
     "DiscoveryInfo",
     "InvalidDiscoveryInfo",
@@ -32,6 +33,9 @@ GID_SIZE_OLD: Final = 24
 
 OLD_DISTROS: Final = ("foxy", "galactic", "humble")
 """Distributions of ROS 2 that write gids of 24 bytes."""
+
+NEW_DISTROS: Final = ("iron", "jazzy", "kilted", "lyrical", "rolling")
+"""Those that write 16."""
 
 MAX_BYTES: Final = 4 << 20
 """Bytes read of one sample; what is larger is refused."""

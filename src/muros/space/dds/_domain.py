@@ -283,11 +283,6 @@ class DdsDomain:
         data = None if remote is None else remote.endpoints.get(gid)
         return None if data is None else self.shown(data)
 
-    def carries_requests(self, endpoint: Endpoint) -> bool:
-        """Whether it is the request side of a service."""
-        own = self.endpoints.get(endpoint.gid)
-        return endpoint.topic.startswith("rq/") if own is None else own.carries_requests
-
     def concerns(self, pair: tuple[bytes, bytes]) -> bool:
         """Whether one of the two is ours, so that it is known whether they match."""
         return pair[0] in self.endpoints or pair[1] in self.endpoints

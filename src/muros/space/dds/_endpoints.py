@@ -25,6 +25,10 @@ _HEADS: Final = tuple(CDR_LE.to_bytes(2, "big") + bytes((0, pad)) for pad in ran
 """Encapsulation of little-endian CDR; the last two bits count the bytes that fill up to a multiple of 4."""
 
 
+TIME_END: Final = 0xFFFFFFFF * 10**9
+"""ns since 1970 from which on a time does not fit RTPS; boards may say anything."""
+
+
 def encapsulated(data: bytes, representation: int = CDR_LE) -> bytes:
     """`data` as a serialized payload."""
     pad = -len(data) & 3
@@ -75,12 +79,16 @@ class DdsWriter(EngineEndpoint):
         if self.closed:
             raise ClosedError(f"the writer of {self.topic.name} is closed; make a new one")
         home = self.participant.home
+        if source_time is None or not 0 <= source_time < TIME_END:
+            source_time = self.core.clock()
+        if to is not None and to not in self.out.matched:
+            return 0  # it has gone meanwhile
         if self.deadline is not None:
             self.deadline.touch()
         sequence = self.out.write(
             payload,
             home.now(),
-            source_time=self.core.clock() if source_time is None else source_time,
+            source_time=source_time,
             inline_qos=inline_qos,
             to=to,
         )

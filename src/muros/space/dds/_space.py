@@ -16,6 +16,7 @@ from muros.space._core import Core, Limits
 from muros.space._door import ClosedError, SpaceError
 from muros.space._endpoint import Closing
 from muros.space._participant import prefix_of, prefixes
+from muros.space.dds._discovery_info import NEW_DISTROS, OLD_DISTROS
 from muros.space.dds._domain import Carrier, DdsDomain
 from muros.space.dds._participant import DdsParticipant
 from muros.space.dds._remote import VERSION
@@ -62,7 +63,7 @@ class DdsSpace(Closing):
         seed = _seed()
         self._salt = seed
         self._next_prefix = prefixes(seed)
-        self.graph = DdsGraph(self._core, self._domains)
+        self.graph = DdsGraph(self._core, self._domains, domain)
 
     @property
     def limits(self) -> Limits:
@@ -187,6 +188,10 @@ def open_dds(
     if unknown:
         known = ", ".join((*LIMITS, *NETWORK, *OTHERS))
         raise TypeError(f"dds: has no option {', '.join(unknown)} (known: {known})")
+    distro = options.get("ros_distro")
+    if distro is not None and distro not in (*OLD_DISTROS, *NEW_DISTROS):
+        known = ", ".join((*OLD_DISTROS, *NEW_DISTROS))
+        raise SpaceError(f"ros_distro {distro!r} is not known; take the nearest of {known}")
     limits = Limits(**{name: options[name] for name in LIMITS if name in options})
     carrier = options.get("carrier")
     domain = int(rest) if rest else None
@@ -199,7 +204,7 @@ def open_dds(
         findings=findings,
         clock=clock,
         limits=limits,
-        ros_distro=options.get("ros_distro"),
+        ros_distro=distro,
     )
 
 

@@ -25,9 +25,10 @@ __all__ = ["DdsGraph"]
 class DdsGraph:
     """See `muros.space.Graph`."""
 
-    def __init__(self, core: Core, domains: dict[int, DdsDomain]) -> None:
+    def __init__(self, core: Core, domains: dict[int, DdsDomain], domain: int) -> None:
         self._core = core
         self._domains = domains
+        self._domain = domain
 
     @property
     def participants(self) -> tuple[ParticipantInfo, ...]:
@@ -77,17 +78,17 @@ class DdsGraph:
             found += [_service(domain, name, endpoints) for name, endpoints in services.items()]
         return tuple(info for info in found if info.servers or info.clients)
 
-    def topic(self, name: str, domain: int = 0) -> TopicInfo | None:
+    def topic(self, name: str, domain: int | None = None) -> TopicInfo | None:
         """One topic."""
-        home = self._domains.get(domain)
+        home = self._home(domain)
         if home is None:
             return None
         endpoints = [endpoint for endpoint in _all(home, name) if endpoint.topic == name]
         return _topic(home, name, endpoints) if endpoints else None
 
-    def service(self, name: str, domain: int = 0) -> ServiceInfo | None:
+    def service(self, name: str, domain: int | None = None) -> ServiceInfo | None:
         """One service."""
-        home = self._domains.get(domain)
+        home = self._home(domain)
         if home is None:
             return None
         info = _service(home, name, [endpoint for endpoint in _all(home) if endpoint.service == name])
@@ -109,6 +110,9 @@ class DdsGraph:
             self._core.watchers.pop(key, None)
 
         return cancel
+
+    def _home(self, domain: int | None) -> DdsDomain | None:
+        return self._domains.get(self._domain if domain is None else domain)
 
 
 def _all(domain: DdsDomain, topic: str | None = None) -> Iterator[Endpoint]:
@@ -154,9 +158,19 @@ def _reasons(writer: Endpoint, reader: Endpoint) -> tuple[str, ...]:
 def _service(domain: DdsDomain, name: str, endpoints: list[Endpoint]) -> ServiceInfo:
     """The request side tells: its readers are the servers, its writers the clients.
 
-    Endpoints of others count where their topic is one of requests; ours where they are part of a service.
+    Others' endpoints count when their participant has the other side too; else they merely listen.
     """
-    requests = [endpoint for endpoint in endpoints if domain.carries_requests(endpoint)]
+    replying = {(each.gid[:12], each.role) for each in endpoints if each.topic.startswith("rr/")}
+    opposite = {Role.READER: Role.WRITER, Role.WRITER: Role.READER}
+    requests = [
+        each
+        for each in endpoints
+        if (
+            domain.endpoints[each.gid].carries_requests
+            if each.gid in domain.endpoints
+            else each.topic.startswith("rq/") and (each.gid[:12], opposite[each.role]) in replying
+        )
+    ]
     return ServiceInfo(
         name,
         domain.number,

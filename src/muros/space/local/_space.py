@@ -40,7 +40,7 @@ class LocalSpace(Closing):
         self._core = Core(clock, self.findings, limits or Limits())
         self._domains: dict[int, Domain] = {}
         self._next_prefix = prefixes(os.urandom(8))
-        self.graph = LocalGraph(self._core, self._domains)
+        self.graph = LocalGraph(self._core, self._domains, domain)
 
     @property
     def limits(self) -> Limits:

@@ -24,9 +24,10 @@ __all__ = ["LocalGraph"]
 class LocalGraph:
     """See `muros.space.Graph`."""
 
-    def __init__(self, core: Core, domains: dict[int, Domain]) -> None:
+    def __init__(self, core: Core, domains: dict[int, Domain], domain: int) -> None:
         self._core = core
         self._domains = domains
+        self._domain = domain
 
     @property
     def participants(self) -> tuple[ParticipantInfo, ...]:
@@ -64,15 +65,15 @@ class LocalGraph:
             info for domain in self._domains.values() for info in _services(domain.endpoints.values(), domain)
         )
 
-    def topic(self, name: str, domain: int = 0) -> TopicInfo | None:
+    def topic(self, name: str, domain: int | None = None) -> TopicInfo | None:
         """One topic."""
-        home = self._domains.get(domain)
+        home = self._home(domain)
         record = None if home is None else home.topics.get(name)
-        return None if record is None else _topic_info(record, domain)
+        return None if home is None or record is None else _topic_info(record, home.number)
 
-    def service(self, name: str, domain: int = 0) -> ServiceInfo | None:
+    def service(self, name: str, domain: int | None = None) -> ServiceInfo | None:
         """One service."""
-        home = self._domains.get(domain)
+        home = self._home(domain)
         if home is None:
             return None
         return next(_services((e for e in home.endpoints.values() if e.service == name), home), None)
@@ -93,6 +94,9 @@ class LocalGraph:
             self._core.watchers.pop(key, None)
 
         return cancel
+
+    def _home(self, domain: int | None) -> Domain | None:
+        return self._domains.get(self._domain if domain is None else domain)
 
     def _endpoints(self) -> Iterator[EngineEndpoint]:
         for domain in self._domains.values():
