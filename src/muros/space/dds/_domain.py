@@ -206,7 +206,8 @@ class DdsDomain:
         participant.rtps.close(self.now())
         if self.lead is participant:
             self.lead = self._info_reader = None
-            following = next(iter(self.participants.values()), None)
+            # The youngest: where all leave, in whatever order, the books pass on once or never.
+            following = next(reversed(self.participants.values()), None)
             if following is not None:
                 self._take_lead(following)
             else:
