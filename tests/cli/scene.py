@@ -50,7 +50,7 @@ class Running:
         tool = Tool(
             scene.space,
             spin_time=SPIN_TIME,
-            node_name=getattr(arguments, "node_name", None) or "_muros_test",
+            node_name=getattr(arguments, "own_name", None) or "_muros_test",
             out=self.out,
             err=self.err,
         )

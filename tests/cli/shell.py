@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import IO
 
@@ -65,6 +66,11 @@ class Shell:
             timeout=LIMIT,
             check=False,
         )
+
+    def outputs(self, *lines: str) -> list[str]:
+        """What several commands print, run at once: they mostly wait for the network."""
+        with ThreadPoolExecutor(len(lines)) as pool:
+            return [done.stdout for done in pool.map(self.run, lines)]
 
     @contextmanager
     def running(self, line: str) -> Iterator[Process]:

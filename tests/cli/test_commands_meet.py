@@ -37,19 +37,24 @@ def test_what_pub_says_echo_prints(shell: Shell) -> None:
 def test_a_publisher_is_seen_measured_and_gone(shell: Shell) -> None:
     with shell.running(f"topic pub -n lamp -r 100 -p 10 /lamp/state {STRING} 'data: \"on\"'") as pub:
         pub.line("publishing #10: ")
-        assert shell.run("node list").stdout == "/lamp\n"
-        assert shell.run("topic list -t").stdout == f"/lamp/state [{STRING}]\n"
-        info = shell.run("topic info -v /lamp/state").stdout
+        nodes, topics, info, node, graph = shell.outputs(
+            "node list", "topic list -t", "topic info -v /lamp/state", "node info /lamp", "graph"
+        )
+        assert nodes == "/lamp\n"
+        assert topics == f"/lamp/state [{STRING}]\n"
         assert "Node name: lamp\nNode namespace: /\n" in info
         assert f"Topic type hash: {HASH}\nEndpoint type: PUBLISHER\n" in info
         assert "  Reliability: RELIABLE\n  History (Depth): UNKNOWN\n" in info
-        assert "    /lamp/state: std_msgs/msg/String\n" in shell.run("node info /lamp").stdout
-        assert shell.run("topic hz /lamp/state --times 1").stdout.startswith("average rate: ")
-        assert (
-            "\tMessage size mean: 0.01 KB min: 0.01 KB" in shell.run("topic bw /lamp/state --times 1").stdout
+        assert "    /lamp/state: std_msgs/msg/String\n" in node
+        assert "  writes  /lamp/state  std_msgs/msg/String  -> nobody\n" in graph
+        rate, bandwidth, values = shell.outputs(
+            "topic hz /lamp/state --times 1",
+            "topic bw /lamp/state --times 1",
+            "topic echo /lamp/state --once --csv",
         )
-        assert shell.run("topic echo /lamp/state --once --csv").stdout == "on\n"
-        assert "  writes  /lamp/state  std_msgs/msg/String  -> nobody\n" in shell.run("graph").stdout
+        assert rate.startswith("average rate: ")
+        assert "\tMessage size mean: 0.01 KB min: 0.01 KB" in bandwidth
+        assert values == "on\n"
         status, _ = pub.stop()
         assert status == 130
     assert shell.run("node list").stdout == ""
@@ -91,15 +96,18 @@ def test_a_service_is_listed_and_called(shell: Shell) -> None:
         assert server.stdout is not None
         assert server.stdout.readline() == "ready\n"
         kind = "example_interfaces/srv/AddTwoInts"
-        assert shell.run("service list -t").stdout == f"/add [{kind}]\n"
-        assert shell.run("service type /add").stdout == f"{kind}\n"
-        assert shell.run("service call /add '{a: 24, b: 42}'").stdout == (
+        listed, of_type, of_node = shell.outputs("service list -t", "service type /add", "node info adder")
+        assert listed == f"/add [{kind}]\n"
+        assert of_type == f"{kind}\n"
+        assert "    /add: example_interfaces/srv/AddTwoInts\n" in of_node
+        once, thrice = shell.outputs(
+            "service call /add '{a: 24, b: 42}'", f"service call /add {kind} '{{a: 1}}' -r 20 --times 3"
+        )
+        assert once == (
             "requester: making request: example_interfaces.srv.AddTwoInts_Request(a=24, b=42)\n\n"
             "response:\nexample_interfaces.srv.AddTwoInts_Response(sum=66)\n\n"
         )
-        done = shell.run(f"service call /add {kind} '{{a: 1}}' -r 20 --times 3")
-        assert done.stdout.count("AddTwoInts_Response(sum=1)") == 3
-        assert "    /add: example_interfaces/srv/AddTwoInts\n" in shell.run("node info adder").stdout
+        assert thrice.count("AddTwoInts_Response(sum=1)") == 3
     finally:
         server.communicate(timeout=LIMIT)
 

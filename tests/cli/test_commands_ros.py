@@ -30,15 +30,15 @@ def lab(request: pytest.FixtureRequest) -> Iterator[Lab]:
 def test_node_and_its_topics_and_services_are_seen(lab: Lab) -> None:
     lab.ros.do("publisher", node=lab.node, topic="scan", type="sensor_msgs/msg/LaserScan")
     lab.ros.do("service", node=lab.node, name="/reset", type="std_srvs/srv/Trigger")
-    assert lab.shell.run("node list").stdout == "/lab/robot\n"
-    topics = lab.shell.run("topic list -t").stdout
+    nodes, topics, services, info, about = lab.shell.outputs(
+        "node list", "topic list -t", "service list -t", "node info /lab/robot", "topic info -v /lab/scan"
+    )
+    assert nodes == "/lab/robot\n"
     assert "/lab/scan [sensor_msgs/msg/LaserScan]\n" in topics
     assert "/rosout [rcl_interfaces/msg/Log]\n" in topics
-    assert "/reset [std_srvs/srv/Trigger]\n" in lab.shell.run("service list -t").stdout
-    info = lab.shell.run("node info /lab/robot").stdout
+    assert "/reset [std_srvs/srv/Trigger]\n" in services
     assert "  Publishers:\n    /lab/scan: sensor_msgs/msg/LaserScan\n" in info
     assert "    /reset: std_srvs/srv/Trigger\n" in info
-    about = lab.shell.run("topic info -v /lab/scan").stdout
     assert "Node name: robot\nNode namespace: /lab\n" in about
     assert (
         "Topic type hash: RIHS01_64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828\n" in about

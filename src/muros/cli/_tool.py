@@ -293,7 +293,7 @@ async def _main(
     if this is not None:
         loop.add_signal_handler(signal.SIGTERM, this.cancel)
     space = open_space(space_url(arguments.space, arguments.domain))
-    tool = Tool(space, spin_time=arguments.spin_time, node_name=getattr(arguments, "node_name", None) or "")
+    tool = Tool(space, spin_time=arguments.spin_time, node_name=getattr(arguments, "own_name", None) or "")
     try:
         space.attach(loop)
         return await command(tool, arguments) or 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 DESCRIPTION = """\
 Write the modules of muros that boards use, and the classes of the types you name with all that they need, into a
@@ -13,6 +13,7 @@ folder, ready to be copied to the library folder of a MicroPython board.
 """
 EPILOG = """\
 Name all types of your program at once: muros board copy build/board std_msgs/msg/Int32 sensor_msgs/msg/Imu
+The constants of some types take more memory than their code; those are left out, unless a --program names them.
 With --mpy the files are compiled by mpy-cross: they take less memory to import, and less flash. Native code for
 serial lines is compiled for --march, as armv6m, armv7emsp, xtensawin, rv32imc or x64, and left out without.
 """
@@ -31,6 +32,7 @@ def register(subparsers: Any) -> None:
     )
     copy.add_argument("folder", metavar="DIR", type=Path, help="made if it is not there")
     copy.add_argument("types", nargs="*", metavar="TYPE", help="std_msgs/msg/Int32, or short std_msgs/Int32")
+    add_program(copy)
     copy.add_argument("--mpy", action="store_true", help="compile with mpy-cross")
     copy.add_argument("--march", metavar="ARCH", help="with --mpy: native code for this architecture")
     copy.add_argument(
@@ -53,7 +55,8 @@ def _copy(arguments: argparse.Namespace) -> int:
     try:
         for folder in arguments.path:
             interfaces.add_path(folder)
-        tree = _floor.board_tree() | _types(arguments.types)
+        constants = constants_of(arguments.program)
+        tree = _floor.board_tree() | _types(arguments.types, constants)
         left_out = [path for path in tree if _floor.is_native(tree[path])] if arguments.mpy else []
         if arguments.mpy:
             tree = _floor.compiled(tree, arguments.march)
@@ -65,6 +68,8 @@ def _copy(arguments: argparse.Namespace) -> int:
         print(f"muros: {error.filename or arguments.folder}: {error.strerror}", file=sys.stderr)
         return 1
     _report(tree, arguments.folder)
+    if constants is None:
+        report_constants(arguments.types, sys.stdout)
     if left_out and not arguments.march:
         print(
             f"Left out: native code ({', '.join(left_out)}). --march ARCH adds it; serial lines work without."
@@ -72,10 +77,41 @@ def _copy(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _types(names: list[str]) -> dict[str, bytes]:
+def add_program(parser: argparse.ArgumentParser) -> None:
+    """Adds ``--program``, which says which constants to keep."""
+    parser.add_argument(
+        "--program",
+        action="append",
+        default=[],
+        metavar="FILE",
+        type=Path,
+        help="for boards: keep just those constants of types that this program names; may be given again",
+    )
+
+
+def constants_of(programs: list[Path]) -> frozenset[str] | None:
+    """What to keep: names in the programs, or None when there is none. Raises OSError."""
     from muros.interfaces import board
 
-    return {path: text.encode() for path, text in board.sources(names).items()}
+    texts = [path.read_text("utf-8", errors="replace") for path in programs]
+    return board.constants_in("\n".join(texts)) if texts else None
+
+
+def report_constants(types: list[str], file: TextIO) -> None:
+    """Says which types lost their constants."""
+    from muros.interfaces import board
+
+    for name, number in board.without_constants(types).items():
+        print(
+            f"Left out: the {number} constants of {name}. --program FILE keeps those that your program names.",
+            file=file,
+        )
+
+
+def _types(names: list[str], constants: frozenset[str] | None) -> dict[str, bytes]:
+    from muros.interfaces import board
+
+    return {path: text.encode() for path, text in board.sources(names, constants=constants).items()}
 
 
 def _replace(tree: dict[str, bytes], folder: Path) -> None:

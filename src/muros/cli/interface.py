@@ -7,6 +7,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+from muros.cli.board import add_program, constants_of, report_constants
+
 EPILOG = """\
 Types of your own are found in the folders of $MUROS_INTERFACES or of --path: package/msg/MyType.msg.
 Standard types are those of the newest ROS 2 distribution, or of $MUROS_DISTRO.
@@ -46,6 +48,7 @@ def register(subparsers: Any) -> None:
     generate.add_argument("types", nargs="+", metavar="TYPE")
     generate.add_argument("-o", "--output", required=True, metavar="DIR", help="folder for the packages")
     generate.add_argument("--board", action="store_true", help="small classes for MicroPython")
+    add_program(generate)
     generate.add_argument(
         "--action-services", action="store_true", help="boards: also what carries an action"
     )
@@ -145,7 +148,12 @@ def _generate(arguments: argparse.Namespace) -> None:
     if arguments.board:
         from muros.interfaces import board
 
-        files = board.generate(arguments.types, arguments.output, arguments.action_services)
+        constants = constants_of(arguments.program)
+        files = board.generate(
+            arguments.types, arguments.output, arguments.action_services, constants=constants
+        )
+        if constants is None:
+            report_constants(arguments.types, sys.stderr)
     else:
         from muros.interfaces import host
 

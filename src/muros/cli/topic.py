@@ -264,7 +264,7 @@ def _add_pub(words: Any) -> None:
     parser.add_argument(
         "--keep-alive", type=float, default=0.1, metavar="S", help="stay S seconds after the last (0.1)"
     )
-    parser.add_argument("-n", "--node-name", metavar="NAME", help="publish as this node")
+    parser.add_argument("-n", "--node-name", dest="own_name", metavar="NAME", help="publish as this node")
     add_type_options(parser)
     _add_qos(parser, "default")
 
