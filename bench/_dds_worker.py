@@ -13,7 +13,8 @@ import resource
 import sys
 import threading
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Coroutine
+from typing import Any, Protocol
 
 TYPE = "std_msgs::msg::dds_::String_"
 WARM_UP = 300
@@ -22,6 +23,22 @@ TURN = 32
 """Samples written before the loop gets its turn."""
 ENDPOINTS = 500
 """Writers, and as many readers, of each of two processes with many."""
+
+
+class Implementation(Protocol):
+    """What is the same in all of them."""
+
+    def writer(self, topic: str) -> Callable[[], bool]:
+        """A new writer: a function that writes the one sample, False = there is no room."""
+
+    def reader(self, topic: str, on_sample: Callable[[], object]) -> None:
+        """A new reader."""
+
+    def matched(self) -> int:
+        """How many writers and readers its own have met."""
+
+    def run(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        """Runs this to its end, and whatever the implementation needs beside it."""
 
 
 class Muros:
@@ -36,7 +53,7 @@ class Muros:
         self._participant = self._space.participant("bench")
         self._qos = Qos(history=History.KEEP_ALL, reliability=Reliability.RELIABLE)
         self._body = cdr_string(size)
-        self._ends = []
+        self._ends: list[Any] = []
 
     def writer(self, topic: str) -> Callable[[], bool]:
         from muros.space import Topic
@@ -58,12 +75,12 @@ class Muros:
     def matched(self) -> int:
         return sum(len(end.matched) for end in self._ends)
 
-    def run(self, work: Callable[[], Awaitable[object]]) -> None:
+    def run(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         self._loop.run_until_complete(work())
         self._space.close()
 
 
-class Rtps(Muros):
+class Rtps:
     """The RTPS core and its network, without the space."""
 
     def __init__(self, domain: int, size: int) -> None:
@@ -77,7 +94,7 @@ class Rtps(Muros):
         )
         self._qos = EndpointQos(history=History.KEEP_ALL)
         self._payload = b"\0\1\0\0" + cdr_string(size)
-        self._ends = []
+        self._ends: list[Any] = []
 
     def writer(self, topic: str) -> Callable[[], bool]:
         clock, poke, payload = self._network.clock, self._network.poke, self._payload
@@ -101,13 +118,10 @@ class Rtps(Muros):
     def matched(self) -> int:
         return sum(len(end.matched) for end in self._ends)
 
-    def run(self, work: Callable[[], Awaitable[object]]) -> None:
-        async def all_of_it() -> None:
-            self._network.open(asyncio.get_running_loop())
-            await work()
-            self._network.close()
-
-        self._loop.run_until_complete(all_of_it())
+    def run(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        self._network.open(self._loop)
+        self._loop.run_until_complete(work())
+        self._network.close()
 
 
 class Cyclone:
@@ -120,8 +134,10 @@ class Cyclone:
         from cyclonedds.domain import DomainParticipant
         from cyclonedds.idl import IdlStruct
 
+        base: Any = IdlStruct
+
         @dataclass
-        class String(IdlStruct, typename=TYPE):
+        class String(base, typename=TYPE):  # type: ignore[call-arg, misc]
             data: str
 
         self._type = String
@@ -133,7 +149,7 @@ class Cyclone:
             Policy.ResourceLimits(max_samples=5000, max_instances=-1, max_samples_per_instance=-1),
         )
         self._sample = String("x" * size)
-        self._ends = []
+        self._ends: list[Any] = []
 
     def writer(self, topic: str) -> Callable[[], bool]:
         from cyclonedds.pub import DataWriter
@@ -163,7 +179,9 @@ class Cyclone:
                 for _ in samples:
                     on_sample()
 
-        class Told(Listener):
+        base: Any = Listener
+
+        class Told(base):  # type: ignore[misc]
             def on_data_available(listener, _: object) -> None:  # noqa: N805
                 nonlocal pending
                 if not pending:
@@ -187,7 +205,7 @@ class Cyclone:
             for end in self._ends
         )
 
-    def run(self, work: Callable[[], Awaitable[object]]) -> None:
+    def run(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         self._loop.run_until_complete(work())
 
 
@@ -209,16 +227,21 @@ class Rclpy:
         self._qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=0)
         self._type = String
         self._message = String(data="x" * size)
-        self._writers = []
+        self._writers: list[Any] = []
         self._readers = 0
 
     def writer(self, topic: str) -> Callable[[], bool]:
         publisher = self._node.create_publisher(self._type, topic.removeprefix("rt/"), self._qos)
         self._writers.append(publisher)
+        from rclpy._rclpy_pybind11 import RCLError
+
         publish, message = publisher.publish, self._message
 
         def write() -> bool:
-            publish(message)
+            try:
+                publish(message)
+            except RCLError:  # no room within its time
+                return False
             return True
 
         return write
@@ -231,17 +254,19 @@ class Rclpy:
 
     def matched(self) -> int:
         names = [publisher.topic_name for publisher in self._writers]
-        matched = sum(publisher.get_subscription_count() for publisher in self._writers)
+        matched: int = sum(publisher.get_subscription_count() for publisher in self._writers)
         return matched + (self._readers if matched >= len(names) else 0)
 
-    def run(self, work: Callable[[], Awaitable[object]]) -> None:
+    def run(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """The executor spins in this thread, which is rclpy's own way; the work has a thread with a loop."""
         done = threading.Event()
 
         def other() -> None:
-            asyncio.run(work())
-            done.set()
-            self._executor.wake()
+            try:
+                asyncio.run(work())
+            finally:
+                done.set()
+                self._executor.wake()
 
         thread = threading.Thread(target=other)
         thread.start()
@@ -262,7 +287,7 @@ def cdr_string(size: int) -> bytes:
 class Roles:
     """What a process does, in the terms of all implementations."""
 
-    def __init__(self, made: Muros | Cyclone | Rclpy, seconds: float) -> None:
+    def __init__(self, made: Implementation, seconds: float) -> None:
         self._made = made
         self._seconds = seconds
 
@@ -281,7 +306,10 @@ class Roles:
 
         self._made.reader("rt/flood", on_sample)
         say("ready")
-        await self._input_closed()
+        awaited = int(await self._input_closed())
+        end = time.perf_counter() + 20
+        while count < awaited and time.perf_counter() < end:
+            await asyncio.sleep(0.01)
         seconds = last - first
         say({"received": count, "seconds": seconds, "cpu": time.process_time() - cpu})
 
@@ -298,8 +326,9 @@ class Roles:
                     break
                 count += 1
             await asyncio.sleep(0)
-        say({"sent": count, "cpu": time.process_time() - cpu})
+        say({"sent": count})
         await self._input_closed()
+        say({"cpu": time.process_time() - cpu})
 
     async def calm(self) -> None:
         """Writes a thousand samples a second."""
@@ -313,8 +342,9 @@ class Roles:
                 write()
                 count += 1
             await asyncio.sleep(start + count / 1000 - time.perf_counter())
-        say({"sent": count, "cpu": time.process_time() - cpu})
+        say({"sent": count})
         await self._input_closed()
+        say({"cpu": time.process_time() - cpu})
 
     async def echo(self) -> None:
         """Answers."""
@@ -385,8 +415,9 @@ class Roles:
             while self._made.matched() < ends:
                 await asyncio.sleep(0.05)
 
-    async def _input_closed(self) -> None:
-        await asyncio.to_thread(sys.stdin.read)
+    async def _input_closed(self) -> str:
+        """What the input was."""
+        return await asyncio.to_thread(sys.stdin.read)
 
 
 def say(what: object) -> None:
@@ -400,7 +431,12 @@ def resident() -> int:
         return int(file.read().split()[1]) * resource.getpagesize()
 
 
-IMPLEMENTATIONS = {"muros": Muros, "rtps": Rtps, "cyclone": Cyclone, "rclpy": Rclpy}
+IMPLEMENTATIONS: dict[str, Callable[[int, int], Implementation]] = {
+    "muros": Muros,
+    "rtps": Rtps,
+    "cyclone": Cyclone,
+    "rclpy": Rclpy,
+}
 
 
 def main() -> None:

@@ -16,6 +16,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from select import select
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -25,7 +26,7 @@ from tests.dds import peers  # noqa: E402
 from tests.dds.domains import free_domain  # noqa: E402
 
 WORKER = Path(__file__).with_name("_dds_worker.py")
-LIMIT = 90.0
+LIMIT = 40.0
 """Seconds that a step may take."""
 
 PEERS = {"muros": "cyclone", "rtps": "cyclone", "cyclone": "cyclone", "rclpy": "jazzy"}
@@ -42,6 +43,7 @@ class Worker:
             del settings["FASTDDS_BUILTIN_TRANSPORTS"]  # as it comes: with shared memory
         else:
             settings["PYTHONPATH"] = str(ROOT / "src")
+        self._what = f"{implementation} as {role}"
         words = (implementation, role, str(domain), str(size), str(seconds))
         self._process = subprocess.Popen(
             [str(peers.python_of(peer)), str(WORKER), *words],
@@ -55,15 +57,19 @@ class Worker:
     def hear(self) -> Any:
         """The next thing it says."""
         assert self._process.stdout is not None
-        return json.loads(self._process.stdout.readline())
+        if not select([self._process.stdout], [], [], LIMIT)[0]:
+            raise TimeoutError(f"{self._what} said nothing for {LIMIT:.0f} s")
+        line = self._process.stdout.readline()
+        if not line:
+            raise RuntimeError(f"{self._what} has ended")
+        return json.loads(line)
 
-    def end(self) -> Any:
-        """Closes its input; what it says then, if anything."""
+    def end(self, last: object = "") -> Any:
+        """Tells it something and closes its input; what it says then."""
         assert self._process.stdin is not None
-        assert self._process.stdout is not None
+        self._process.stdin.write(str(last))
         self._process.stdin.close()
-        last = self._process.stdout.readline()
-        return json.loads(last) if last else None
+        return self.hear()
 
     def kill(self) -> None:
         """However it fares, it is gone after this."""
@@ -102,15 +108,7 @@ def pair(
 
 def flood(implementation: str, size: int, seconds: float) -> dict[str, float]:
     """Samples a second flat out, and what one costs on each side."""
-    with pair(implementation, ("sink", "source"), size, seconds) as (sink, source):
-        sent, received = source.hear(), None
-        received = sink.end()
-    return {
-        "rate": received["received"] / received["seconds"],
-        "write": sent["cpu"] / sent["sent"] * 1e6,
-        "read": received["cpu"] / received["received"] * 1e6,
-        "lost": sent["sent"] - received["received"],
-    }
+    return _one_way(implementation, "source", size, seconds)
 
 
 def trips(implementation: str, size: int, seconds: float) -> dict[str, float]:
@@ -122,12 +120,19 @@ def trips(implementation: str, size: int, seconds: float) -> dict[str, float]:
 
 def calm(implementation: str, size: int, seconds: float) -> dict[str, float]:
     """CPU of a sample on both sides at a thousand a second."""
-    with pair(implementation, ("sink", "calm"), size, seconds) as (sink, source):
-        sent = source.hear()
-        received = sink.end()
+    return _one_way(implementation, "calm", size, seconds)
+
+
+def _one_way(implementation: str, role: str, size: int, seconds: float) -> dict[str, float]:
+    with pair(implementation, ("sink", role), size, seconds) as (sink, source):
+        sent = source.hear()["sent"]
+        received = sink.end(sent)
+        cpu = source.end()["cpu"]
     return {
-        "write": sent["cpu"] / sent["sent"] * 1e6,
+        "rate": received["received"] / received["seconds"],
+        "write": cpu / sent * 1e6,
         "read": received["cpu"] / received["received"] * 1e6,
+        "lost": sent - received["received"],
     }
 
 
