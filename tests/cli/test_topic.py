@@ -513,3 +513,16 @@ def test_the_reliability_that_is_chosen_is_taken() -> None:
         await echo.stop()
 
     play(scenario)
+
+
+def test_echo_fits_publishers_that_are_found_one_after_the_other() -> None:
+    async def scenario(scene: Scene) -> None:
+        first = scene.writer("/a", "/x", STRING)
+        echo = scene.start("topic echo /x --once")
+        await asyncio.sleep(0)
+        second = scene.writer("/b", "/x", STRING, "sensor_data")
+        await scene.until(lambda: first.matched and second.matched)
+        second.write(hello("live"))
+        assert (await echo.end()).out == "data: live\n---\n"
+
+    play(scenario)

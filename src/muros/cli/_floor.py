@@ -19,7 +19,7 @@ Tree = dict[str, bytes]
 Compile = Callable[[str, bytes, str | None], bytes]
 """``compile(path, source, march)`` gives the .mpy file of a source."""
 
-BOARD_FLOOR = ("compat.py", "cdr.py", "cdr_texts.py", "cdr_lists.py", "xrce", "client", "rclc")
+BOARD_FLOOR = ("compat.py", "exports.py", "cdr.py", "cdr_texts.py", "cdr_lists.py", "xrce", "client", "rclc")
 """The rooms below ``muros/`` that boards import."""
 
 HOST_ONLY = frozenset(

@@ -39,8 +39,11 @@ TERMINATED: Final = 128 + signal.SIGTERM
 SPIN_TIME: Final = 1.0
 """Seconds that discovery may take; it ends earlier when nothing new comes any more."""
 
-QUIET_TIME: Final = 0.3
-"""Seconds without anything new after which discovery is taken to be complete."""
+QUIET: Final = 0.3
+"""Part of the spin time without anything new after which discovery is taken to be complete."""
+
+SETTLED: Final = 0.1
+"""The same when what is looked for is there already: others of its kind may be close behind."""
 
 PATIENCE: Final = 4
 """Times the spin time for which discovery goes on as long as new things keep coming."""
@@ -119,15 +122,14 @@ class Tool:
         print(f"muros: {printable(str(text))}", file=err, flush=True)
 
     async def discover(self, until: Callable[[Graph], bool] | None = None) -> None:
-        """Wait until the graph is known as far as it goes, for about `spin_time`; at once when `until` says so.
+        """Wait until the graph is known as far as it goes, for about `spin_time`; hardly at all once `until` holds.
 
         It ends early when something came and then nothing new for a while, and goes on longer while new things
         keep coming.
         """
         own = self.participant.gid
         loop = asyncio.get_running_loop()
-        start = loop.time()
-        last = start
+        start = last = loop.time()
         news = asyncio.Event()
         heard = False
 
@@ -138,17 +140,16 @@ class Tool:
             news.set()
 
         end_watch = self.graph.watch(on_change)
-        quiet = min(QUIET_TIME, self.spin_time)
         try:
-            while until is None or not until(self.graph):
-                now = loop.time()
-                settled = last + quiet if heard else start + self.spin_time
-                end = max(settled, min(start + self.spin_time, last + quiet))
-                end = min(end, start + PATIENCE * self.spin_time)
-                if now >= end:
+            while True:
+                found = until is not None and until(self.graph)
+                quiet = (SETTLED if found else QUIET) * self.spin_time
+                end = last + quiet if heard or found else start + self.spin_time
+                left = min(end, start + PATIENCE * self.spin_time) - loop.time()
+                if left <= 0:
                     return
                 news.clear()
-                await _within(news.wait(), end - now)
+                await _within(news.wait(), left)
         finally:
             end_watch()
 
