@@ -831,6 +831,23 @@ class SpaceConformance:
         self.pass_time(space, self.REQUEST_WAIT)
         assert told == []
 
+    def test_waiting_requests_are_announced_when_the_server_stands(self, space: Space) -> None:
+        node = space.participant("node")
+        requester = node.requester(ADD)
+        requester.send(b"?")
+        self.settle(space)
+        asked: list[bytes] = []
+        servers: list[Replier] = []
+
+        def on_request(identity: bytes, data: bytes) -> None:
+            assert servers, "called inside the call that makes the server"
+            asked.append(data)
+
+        servers.append(node.replier(ADD, None, on_request))
+        self.settle(space)
+        assert asked == [b"?"]
+        assert space.findings.counts() == {}
+
     def test_a_request_does_not_wait_for_ever(self, space: Space, told: list[Finding]) -> None:
         requester = space.participant("client").requester(ADD)
         requester.send(b"1")

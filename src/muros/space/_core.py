@@ -23,6 +23,9 @@ __all__ = ["Core", "Engine", "Limits", "Task"]
 SECOND: Final = 10**9
 """Nanoseconds."""
 
+ROUNDING: Final = 1000
+"""ns by which times in seconds (of findings) may be wrong: a tick that comes a little early would come again at once."""
+
 
 @dataclass(frozen=True, slots=True)
 class Limits:
@@ -144,7 +147,7 @@ class Core:
             summary = self.findings.tick(self.seconds())
         finally:
             self._ticking = False
-        times = [] if summary is None else [int(summary * SECOND) + 1]
+        times = [] if summary is None else [max(int(summary * SECOND), self.clock()) + ROUNDING]
         if (timer := self.timers.next()) is not None:
             times.append(timer)
         if self.engine is not None and (due := self.engine.next()) is not None:

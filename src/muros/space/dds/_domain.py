@@ -309,16 +309,16 @@ class DdsDomain:
 
     @contextmanager
     def making(self) -> Iterator[None]:
-        """What RTPS tells while an entity is being made is heard when it stands."""
-        self._making += 1
-        try:
-            with self.core.hushed():
+        """What RTPS tells while an entity is being made is heard when it stands, and users hear of it later."""
+        with self.core.hushed():
+            self._making += 1
+            try:
                 yield
-        finally:
-            self._making -= 1
-        while self._postponed and not self._making:
-            handle, participant, event = self._postponed.popleft()
-            handle(self, participant, event)
+            finally:
+                self._making -= 1
+            while self._postponed and not self._making:
+                handle, participant, event = self._postponed.popleft()
+                handle(self, participant, event)
 
     def _participant_found(self, participant: DdsParticipant, event: ParticipantFound) -> None:
         if not event.local:
