@@ -307,9 +307,7 @@ class Network:
         for _ in range(self.settings.drain):
             try:
                 datagram, address = recvfrom(DATAGRAM)
-            except (
-                OSError
-            ):  # nothing more; else left over from something sent, and what has come is read next
+            except OSError:  # nothing more, or left over from something sent: then what has come is read next
                 break
             counters.received += 1
             counters.received_bytes += len(datagram)
