@@ -24,7 +24,7 @@ SECOND: Final = 10**9
 """Nanoseconds."""
 
 ROUNDING: Final = 1000
-"""ns by which times in seconds (of findings) may be wrong: a tick that comes a little early would come again at once."""
+"""ns by which times in seconds (of findings) may be wrong: a tick that is a little early would come again at once."""
 
 
 @dataclass(frozen=True, slots=True)
