@@ -9,21 +9,22 @@ import time
 from pathlib import Path
 from typing import Any, Final
 
-import yaml
-
 from muros import interfaces
 from muros.cli._echo import tell_of_mismatches
 from muros.cli._learn import make_known
 from muros.cli._names import full_name, learn_types, required_class, ros_topic
 from muros.cli._qos import chosen_qos
 from muros.cli._tool import CommandError, Tool
-from muros.cli._values import Stamp, fill, read_yaml
+from muros.cli._values import Stamp, fill, read_documents, read_yaml
 from muros.space import Topic, Writer
 
 __all__ = ["publish", "values_text"]
 
 REMARK_PERIOD: Final = 1.0
 """Seconds between two remarks that nobody listens yet."""
+
+DELIVERY_TIME: Final = 5.0
+"""Seconds that the last samples may take to reach reliable subscribers."""
 
 Prepared = tuple[Any, list[Stamp]]
 
@@ -57,6 +58,7 @@ async def publish(tool: Tool, arguments: argparse.Namespace) -> None:
     tool.print("publisher: beginning loop")
     await _loop(tool, writer, messages, arguments, times)
     await asyncio.sleep(arguments.keep_alive)
+    await _delivered(writer)
 
 
 def values_text(arguments: argparse.Namespace) -> str:
@@ -79,9 +81,9 @@ def _messages(made: type[Any], arguments: argparse.Namespace) -> list[Prepared]:
     except UnicodeDecodeError:
         raise CommandError(f"{arguments.yaml_file}: this is no text") from None
     try:
-        documents = [d for d in yaml.safe_load_all(text) if d is not None]
-    except yaml.YAMLError as error:
-        raise CommandError(f"{arguments.yaml_file}: {' '.join(str(error).split())}") from None
+        documents = read_documents(text)
+    except CommandError as error:
+        raise CommandError(f"{arguments.yaml_file}: {error}") from None
     if not documents:
         raise CommandError(f"{arguments.yaml_file}: there are no values in it")
     return [_prepared(made, values) for values in documents]
@@ -137,6 +139,13 @@ async def _loop(
         while not writer.write(data, source_time=now):
             await room.wait()
             room.clear()
+
+
+async def _delivered(writer: Writer) -> None:
+    """Wait until reliable subscribers have got everything, as far as the engine knows; not for ever."""
+    end = time.monotonic() + DELIVERY_TIME
+    while not getattr(writer, "acknowledged", True) and time.monotonic() < end:
+        await asyncio.sleep(0.02)
 
 
 def _tell_of_other_types(tool: Tool, name: str, type_name: str) -> None:

@@ -14,7 +14,18 @@ from muros import interfaces
 from muros.cli._tool import CommandError
 from muros.interfaces import FieldType, Kind, MessageBase
 
-__all__ = ["Look", "Stamp", "fill", "hex_dump", "pick", "read_yaml", "to_csv", "to_plain", "to_yaml"]
+__all__ = [
+    "Look",
+    "Stamp",
+    "fill",
+    "hex_dump",
+    "pick",
+    "read_documents",
+    "read_yaml",
+    "to_csv",
+    "to_plain",
+    "to_yaml",
+]
 
 TRUNCATE_LENGTH: Final = 128
 """Elements of an array, or characters of a string, that are shown unless more are asked for."""
@@ -161,8 +172,16 @@ def _no_step(value: Any, step: str) -> str:
 
 def read_yaml(text: str) -> Any:
     """What YAML text says. CommandError with the place of the mistake if it is none."""
+    documents = read_documents(text)
+    if len(documents) > 1:
+        raise CommandError("the values are several documents; a file with them is taken by --yaml-file")
+    return documents[0] if documents else None
+
+
+def read_documents(text: str) -> list[Any]:
+    """What each document of YAML text says, empty ones left out. CommandError as for one."""
     try:
-        return yaml.load(text, Loader=_Loader)
+        return [values for values in yaml.load_all(text, Loader=_Loader) if values is not None]
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = f" at line {mark.line + 1}, column {mark.column + 1}" if mark else ""
