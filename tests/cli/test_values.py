@@ -141,6 +141,10 @@ def test_values_that_are_understood(name: str, text: str, field: str, value: obj
             "field linear: geometry_msgs/msg/Vector3 needs its fields by name, as in '{x: ..., y: ..., z: ...}'",
         ),
         ("std_msgs/msg/String", "{data: [}", "the values are no YAML at line 1, column "),
+        ("std_msgs/msg/String", "data: 2026-13-45", "the values are no YAML: month must be in "),
+        ("std_msgs/msg/String", "[" * 9000, "the values are no YAML"),
+        ("std_msgs/msg/String", "a: 1\n---\nb: 2", "the values are several documents; "),
+        ("geometry_msgs/msg/Twist", "&a {linear: *a}", "geometry_msgs/msg/Vector3 has no field 'linear' "),
     ],
 )
 def test_values_that_do_not_fit(name: str, text: str, error: str) -> None:

@@ -187,6 +187,8 @@ def read_documents(text: str) -> list[Any]:
         place = f" at line {mark.line + 1}, column {mark.column + 1}" if mark else ""
         problem = getattr(error, "problem", None) or str(error).splitlines()[0]
         raise CommandError(f"the values are no YAML{place}: {problem}") from None
+    except (ValueError, RecursionError) as error:  # a date such as 2026-13-45, or thousands of brackets
+        raise CommandError(f"the values are no YAML: {str(error).splitlines()[0]}") from None
 
 
 def fill(message: Any, values: Any) -> list[Stamp]:
