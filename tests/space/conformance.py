@@ -156,6 +156,7 @@ class SpaceConformance:
             assert sample.related is None
             assert sample.source_time == space.clock()
             assert reader.take() is None
+        assert writer.acknowledged
         assert other.take() is None
 
     def test_what_the_writer_says_of_a_sample_arrives(self, space: Space) -> None:

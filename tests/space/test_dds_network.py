@@ -98,6 +98,21 @@ class TestTopics:
         assert sample is not None
         assert sample.source_time == (time if time in (0, 5) else now)
 
+    def test_a_writer_knows_when_everything_has_arrived(self) -> None:
+        net = Net()
+        one, two = net.computer(), net.computer()
+        writer = one.space.participant("talker").writer(CHATTER, RELIABLE)
+        reader = two.space.participant("listener").reader(CHATTER, RELIABLE)
+        assert writer.acknowledged, "nobody is there"
+        net.until(lambda: writer.matched and reader.matched)
+        net.world.network.loss = 1.0
+        writer.write(bytes(100_000))
+        net.run(SECOND)
+        assert not writer.acknowledged
+        net.world.network.loss = 0.0
+        net.until(lambda: writer.acknowledged)
+        assert reader.pending == 1
+
     def test_who_comes_late_gets_what_is_kept(self) -> None:
         net = Net(loss=0.1)
         one, two = net.computer(), net.computer()

@@ -103,6 +103,10 @@ class Writer(Entity, Protocol):
     def matched(self) -> tuple[bytes, ...]:
         """Gids of the readers it writes to."""
 
+    @property
+    def acknowledged(self) -> bool:
+        """Whether all that was written has reached every matched reader that is reliable."""
+
     def write(
         self,
         data: bytes,

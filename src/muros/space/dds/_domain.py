@@ -27,7 +27,6 @@ from muros.rtps import (
     ParticipantFound,
     ParticipantLost,
     Policy,
-    Received,
     Trouble,
     WriterSettings,
 )
@@ -43,24 +42,14 @@ from muros.space._graph import (
     Unmatched,
     Vanished,
 )
-from muros.space._participant import READER_KIND, WRITER_KIND
 from muros.space._qos import Mismatch, duration, mismatches
-from muros.space._timers import Timer
-from muros.space._values import GID_SIZE
 from muros.space.dds._dialects import Dialect
-from muros.space.dds._discovery_info import (
-    GID_SIZE_OLD,
-    INFO_QOS,
-    INFO_TOPIC,
-    OLD_DISTROS,
-    DiscoveryInfo,
-    InvalidDiscoveryInfo,
-)
-from muros.space.dds._endpoints import DdsEndpoint, DdsReader, DdsWriter, encapsulated
+from muros.space.dds._endpoints import DdsEndpoint, DdsReader, DdsWriter
 from muros.space.dds._names import service_of, type_hash
+from muros.space.dds._nodes import Nodes
 from muros.space.dds._problems import report_domain
 from muros.space.dds._remote import Remote
-from muros.space.dds._wire_qos import from_wire, to_wire
+from muros.space.dds._wire_qos import from_wire
 
 if TYPE_CHECKING:
     import asyncio
@@ -72,17 +61,8 @@ __all__ = ["Carrier", "DdsDomain"]
 LASTS_MOST: Final = 10_000
 """Writers whose last sequence number is remembered for another life."""
 
-DEBOUNCE: Final = 10_000_000
-"""ns in which changes of a node are gathered before others are told."""
-
 NAMES_KNOWN: Final = 500_000_000
 """ns after which the node of an endpoint that was met is known."""
-
-INFO_NUMBER: Final = 0xFFFFFF
-"""Number of the endpoints that carry `ros_discovery_info`; no other endpoint gets that far."""
-
-INFO_WRITER: Final = INFO_NUMBER << 8 | WRITER_KIND
-INFO_READER: Final = INFO_NUMBER << 8 | READER_KIND
 
 
 class Carrier(Protocol):
@@ -137,12 +117,8 @@ class DdsDomain:
         """Writers and readers that match, at least one of them ours."""
         self.lead: DdsParticipant | None = None
         self._distro = ros_distro
-        self._gid_size = GID_SIZE_OLD if ros_distro in OLD_DISTROS else GID_SIZE
-        self._sizes_seen: set[int] = set()
-        self._info_reader: rtps.LocalReader | None = None
         self._lasts: dict[bytes, int] = {}
-        self._dirty: dict[DdsParticipant, None] = {}
-        self._timer: Timer | None = None
+        self.nodes: Final = Nodes(self, ros_distro)
         self._making = 0
         self._postponed: deque[tuple[_Handler, DdsParticipant, rtps.ParticipantEvent]] = deque()
 
@@ -179,15 +155,7 @@ class DdsDomain:
     def join(self, participant: DdsParticipant) -> None:
         """A participant of ours has come."""
         self.participants[participant.gid[:12]] = participant
-        if participant.name:
-            participant.told = participant.rtps.writer(
-                *INFO_TOPIC,
-                to_wire(INFO_QOS, self.core.limits),
-                now=self.now(),
-                entity=INFO_WRITER,
-                last=self.recall(participant.gid[:12] + INFO_WRITER.to_bytes(4, "big")),
-            )
-            self.changed(participant)
+        self.nodes.join(participant)
         if self.lead is None:
             self._take_lead(participant)
         if self.core.watchers:
@@ -197,15 +165,13 @@ class DdsDomain:
 
     def leave(self, participant: DdsParticipant) -> None:
         """A participant of ours goes; its endpoints are out of the books already."""
-        if participant.told is not None:
-            self.remember(participant, participant.told.guid, participant.told.last)
+        self.nodes.leave(participant)
         del self.participants[participant.gid[:12]]
-        self._dirty.pop(participant, None)
         if self.core.watchers:
             self.core.tell(Vanished(participant.info()))
         participant.rtps.close(self.now())
         if self.lead is participant:
-            self.lead = self._info_reader = None
+            self.lead = None
             # The youngest: where all leave, in whatever order, the books pass on once or never.
             following = next(reversed(self.participants.values()), None)
             if following is not None:
@@ -235,15 +201,6 @@ class DdsDomain:
     def recall(self, gid: bytes) -> int:
         """The last sequence number of an earlier life of a writer; 0 = there was none."""
         return self._lasts.get(gid, 0)
-
-    def changed(self, participant: DdsParticipant) -> None:
-        """The endpoints of a node are others than before: tell everybody soon."""
-        if participant.told is None:
-            return
-        self._dirty[participant] = None
-        if self._timer is None:
-            timers = self.core.timers
-            self._timer = timers.at(timers.now() + DEBOUNCE, self._tell_nodes)
 
     def type_hash(self, type_name: str) -> str:
         """Hash of a type's definition, if it is known."""
@@ -471,25 +428,19 @@ class DdsDomain:
             self._lose_endpoint(gone)
         for each in endpoints.values():
             self._find_endpoint(each)
-        self._info_reader = known.reader(
-            *INFO_TOPIC,
-            to_wire(INFO_QOS, self.core.limits),
-            self._info_came,
-            now=self.now(),
-            entity=INFO_READER,
-        )
+        self.nodes.listen(participant)
 
     def _find(self, data: ParticipantData) -> None:
         if data.prefix not in self.remotes and data.prefix not in self.participants:
             remote = self.remotes[data.prefix] = Remote(data, self.number)
-            self._tell_all(Appeared, remote.infos)
+            self.tell_all(Appeared, remote.infos)
 
     def _lose(self, prefix: bytes) -> None:
         remote = self.remotes.get(prefix)
         if remote is not None:
             for data in tuple(remote.endpoints.values()):
                 self._lose_endpoint(data)
-            self._tell_all(Vanished, remote.infos)
+            self.tell_all(Vanished, remote.infos)
             del self.remotes[prefix]
 
     def _find_endpoint(self, data: EndpointData) -> None:
@@ -504,65 +455,11 @@ class DdsDomain:
         if remote is not None and remote.endpoints.pop(data.guid, None) is not None and self.core.watchers:
             self.core.tell(Vanished(self.shown(data)))
 
-    def _tell_all(self, event: type[Appeared] | type[Vanished], infos: tuple[ParticipantInfo, ...]) -> None:
+    def tell_all(self, event: type[Appeared] | type[Vanished], infos: tuple[ParticipantInfo, ...]) -> None:
+        """Tell the watchers of each."""
         if self.core.watchers:
             for info in infos:
                 self.core.tell(event(info))
-
-    def _info_came(self, received: Received) -> bool:
-        """Somebody tells of its nodes."""
-        remote = self.remotes.get(received.writer[:12])
-        if remote is None or len(received.payload) < 4:
-            return True
-        payload = received.payload
-        try:
-            info, size = DiscoveryInfo.parse_untrusted(payload[4:], payload[0] << 8 | payload[1])
-        except InvalidDiscoveryInfo as error:
-            self.core.report(
-                "discovery-info-unreadable",
-                who=remote.bare.owner,
-                what="the nodes of {n} participant{s} are not known",
-                why=str(error),
-                remedy="Nothing, if it is no ROS 2; else look at what it writes on ros_discovery_info",
-            )
-            return True
-        before = remote.infos
-        remote.set_nodes(info.nodes)
-        after = remote.infos
-        self._tell_all(Vanished, tuple(each for each in before if each not in after))
-        self._tell_all(Appeared, tuple(each for each in after if each not in before))
-        if info.nodes:
-            self._adapt(size)
-        self.core.settle()
-        return True
-
-    def _adapt(self, size: int) -> None:
-        """Tell of our nodes as others do."""
-        if size in self._sizes_seen:
-            return
-        self._sizes_seen.add(size)
-        if len(self._sizes_seen) == 1 and self._distro is None and size != self._gid_size:
-            self._gid_size = size
-            for participant in self.participants.values():
-                self.changed(participant)
-        elif len(self._sizes_seen) > 1:
-            self.core.report(
-                "mixed-distros",
-                who=f"domain {self.number}",
-                what=f"nodes are not seen by everybody in domain {self.number}",
-                why="some tell of their nodes as ROS 2 Humble and older do, and some as newer ones do",
-                remedy="Say with ros_distro who shall see the nodes of this process",
-            )
-
-    def _tell_nodes(self) -> None:
-        """Write what has changed of our nodes."""
-        self._timer = None
-        dirty, self._dirty = self._dirty, {}
-        for participant in dirty:
-            if participant.told is not None and not participant.closed:
-                payload = encapsulated(participant.told_entities().body(self._gid_size))
-                participant.told.write(payload, self.now(), source_time=self.core.clock())
-        self.poke()
 
     def _end(self, pair: tuple[bytes, bytes]) -> None:
         """A pair ends from our side."""

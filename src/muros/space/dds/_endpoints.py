@@ -58,6 +58,11 @@ class DdsWriter(EngineEndpoint):
         """Gids of the readers it writes to."""
         return () if self.closed else self.out.matched
 
+    @property
+    def acknowledged(self) -> bool:
+        """Whether all that was written has reached every matched reader that is reliable."""
+        return self.closed or self.out.acknowledged
+
     def write(
         self,
         data: bytes,

@@ -128,7 +128,7 @@ class DdsParticipant(EngineParticipant):
         """Close a child."""
         for endpoint in self._forget(child):
             (endpoint.out if isinstance(endpoint, DdsWriter) else endpoint.source).close(self.home.now())
-        self.home.changed(self)
+        self.home.nodes.changed(self)
         self.home.poke()
 
     def told_entities(self) -> DiscoveryInfo:
@@ -150,7 +150,7 @@ class DdsParticipant(EngineParticipant):
                 if self.core.watchers:
                     self.core.tell(Appeared(endpoint.info()))
                 self._open(endpoint)
-        home.changed(self)
+        home.nodes.changed(self)
         home.poke()
         self.core.settle()
 

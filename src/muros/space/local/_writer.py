@@ -59,6 +59,11 @@ class LocalWriter(EngineEndpoint):
         """Gids of the readers it writes to."""
         return tuple(reader.gid for reader in self.all_readers())
 
+    @property
+    def acknowledged(self) -> bool:
+        """What was written is there at once."""
+        return True
+
     def write(
         self,
         data: bytes,
