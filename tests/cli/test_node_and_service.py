@@ -1,10 +1,12 @@
 """`muros node` and `muros service`: what they print is what `ros2 node` and `ros2 service` print."""
 
+import io
 from typing import Any
 
 import pytest
 
 from muros import interfaces
+from muros.cli import _tool
 from tests.cli.scene import Scene, play
 
 ADD = "example_interfaces/srv/AddTwoInts"
@@ -34,6 +36,27 @@ def test_names_from_others_cannot_command_the_terminal() -> None:
     async def scenario(scene: Scene) -> None:
         scene.space.participant("a\x1b[2Jb\u202ec")
         assert (await scene.muros("node list")).out == "/a\\x1b[2Jb\\u202ec\n"
+
+    play(scenario)
+
+
+class Terminal(io.StringIO):
+    """Standard error of a person."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_a_terminal_is_told_how_far_a_long_discovery_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_tool, "PROGRESS_AFTER", 0.0)
+
+    async def scenario(scene: Scene) -> None:
+        scene.node("/talker")
+        terminal = Terminal()
+        tool = _tool.Tool(scene.space, spin_time=0.02, err=terminal)
+        await tool.discover()
+        assert terminal.getvalue().startswith("\rlooking into domain 0 for 0 s: 1 found\x1b[K")
+        assert terminal.getvalue().endswith("\r\x1b[K")
 
     play(scenario)
 

@@ -48,6 +48,12 @@ SETTLED: Final = 0.1
 PATIENCE: Final = 4
 """Times the spin time for which discovery goes on as long as new things keep coming."""
 
+PROGRESS_AFTER: Final = 1.5
+"""Seconds of discovery after which a terminal is told how far it is."""
+
+PROGRESS_PERIOD: Final = 0.5
+"""Seconds between two such tellings."""
+
 HIDDEN_NODE: Final = "_muros_"
 """Names of the commands' own nodes begin so: as all that begin with an underscore, they are not listed."""
 
@@ -87,6 +93,7 @@ class Tool:
         self._out = out
         self._err = err
         self._participant: Participant | None = None
+        self._progressing = False
 
     @property
     def participant(self) -> Participant:
@@ -148,10 +155,12 @@ class Tool:
                 left = min(end, start + PATIENCE * self.spin_time) - loop.time()
                 if left <= 0:
                     return
+                self._progress(loop.time() - start)
                 news.clear()
-                await _within(news.wait(), left)
+                await _within(news.wait(), min(left, PROGRESS_PERIOD))
         finally:
             end_watch()
+            self._progress(None)
 
     async def wait_for(self, condition: Callable[[Graph], bool], timeout: float | None = None) -> bool:
         """Wait until `condition` holds, asked again after each change of the graph. False: it took too long."""
@@ -168,6 +177,21 @@ class Tool:
             return True
         finally:
             end_watch()
+
+    def _progress(self, seconds: float | None) -> None:
+        """On a terminal, show how far discovery is when it takes long; None takes the line away again."""
+        err = self._err or sys.stderr
+        if seconds is None:
+            if not self._progressing:
+                return
+            text = ""
+        else:
+            if seconds < PROGRESS_AFTER or not err.isatty():
+                return
+            others = sum(p.domain == self.domain for p in self.graph.participants) - 1
+            text = f"looking into domain {self.domain} for {seconds:.0f} s: {others} found"
+        self._progressing = seconds is not None
+        print(f"\r{text}\x1b[K", end="", file=err, flush=True)
 
     def subscribe(self, topic: Topic, qos: Qos, handle: Callable[[Sample], object]) -> Subscription:
         """Hand every sample of a topic to `handle` as it comes."""
