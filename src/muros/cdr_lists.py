@@ -1,6 +1,7 @@
 """CDR for boards: sequences of numbers and of strings; see :mod:`muros.cdr` and :mod:`muros.cdr_texts`.
 
-A ``code`` is one of ``struct`` and ``array``; ``B`` stands for bytes, ``s`` for strings.
+A ``code`` is one of ``struct`` and ``array``; ``B`` stands for bytes, ``s`` for strings and,
+in reading, ``?`` for bools.
 """
 
 from array import array
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
 
 
 def sequence(at: "list[Any]", code: str, bound: int = 0) -> "Any":
-    """The next sequence: an array, bytes or a list of strings. Allocates twice its bytes."""
+    """The next sequence: an array, bytes, or a list of strings or bools. Allocates twice its bytes."""
+    if code == "?":
+        return list(map(bool, sequence(at, "B", bound)))
     size = calcsize(code)
     n = count(at, size, bound)
     if code == "s":

@@ -167,9 +167,15 @@ class _Placed(_Walker):
         self._at = At(1, 0)
         self._base = "p"
         self._walk(found)
+        return self._returned()
+
+    def _returned(self) -> list[str]:
+        """The lines, with one that returns the position."""
         self._flush()
-        self.code.line(f"return {self._position()}")
-        return self.code.lines
+        value, lines = self._position(), self.code.lines
+        if value == "p" and lines[-1].startswith("p = "):
+            value = lines.pop().removeprefix("p = ")
+        return [*lines, f"return {value}"]
 
     def _position(self, more: int = 0) -> str:
         const = self._const + more
@@ -206,8 +212,7 @@ class _Sizer(_Placed):
 
     def run(self, found: Sequence[Leaf]) -> list[str]:
         self._walk(found)
-        self.code.line(f"return {self._position()}")
-        return (self._memo.start() if self._memo else []) + self.code.lines
+        return (self._memo.start() if self._memo else []) + self._returned()
 
     def _leaf(self, leaf: Leaf) -> None:
         match leaf:
@@ -261,9 +266,7 @@ class _Writer(_Placed):
 
     def run(self, found: Sequence[Leaf]) -> list[str]:
         self._walk(found)
-        self._flush()
-        self.code.line(f"return {self._position()}")
-        return (self._memo.start() if self._memo else []) + self.code.lines
+        return (self._memo.start() if self._memo else []) + self._returned()
 
     def _leaf(self, leaf: Leaf) -> None:
         match leaf:
@@ -354,7 +357,7 @@ class _Runs(_Walker):
                 target, size = self.code.place(leaf.path), leaf.size * leaf.count
                 self._value(leaf.size, f"{size}s", target, size)
                 if leaf.code == "?":
-                    self._later.append(f"{target} = {_bools(target)}")
+                    self._later.append(f"{target} = list(map(bool, {target}))")
                 elif leaf.code != "B":
                     self._later.append(f'{target} = array("{leaf.code}", {target})')
             case Dummy():
@@ -388,7 +391,7 @@ class _FixedReader(_Runs):
             self._unpack('unpack_from("{}", buf, off)')
         else:
             self._read()
-        self.code.line(f"ended(n - {size})")
+        self.code.line(f"return ended(n - {size})")
         return self.code.lines
 
     def _read(self) -> None:
@@ -412,7 +415,7 @@ class _Reader(_Runs):
         self.code.line("at = [buf, off, off + n, off]")
         self._walk(found)
         self._flush()
-        self.code.line("finish(at)")
+        self.code.line("return finish(at)")  # None; a return of its own would take two bytes more
         return self.code.lines
 
     def element(self, found: Sequence[Leaf]) -> list[str]:
@@ -429,8 +432,7 @@ class _Reader(_Runs):
                 self._assign(leaf.path, f"text(at, {leaf.bound})" if leaf.bound else "text(at)")
             case Numbers():
                 bound = f", {leaf.bound}" if leaf.bound else ""
-                value = f'sequence(at, "{_bytewise(leaf.code)}"{bound})'
-                self._assign(leaf.path, _bools(value) if leaf.code == "?" else value)
+                self._assign(leaf.path, f'sequence(at, "{leaf.code}"{bound})')
             case Many() if _is_texts(leaf):
                 bound = f", {leaf.bound}" if leaf.bound else ""
                 self._assign(leaf.path, f'sequence(at, "s"{bound})')
@@ -490,10 +492,6 @@ class _Reader(_Runs):
 def _bytewise(code: str) -> str:
     """The code of numbers as they are packed: bools as bytes, since MicroPython packs no others."""
     return "B" if code == "?" else code
-
-
-def _bools(values: str) -> str:
-    return f"list(map(bool, {values}))"
 
 
 def _is_texts(leaf: Many) -> bool:

@@ -5,13 +5,16 @@ program says ``from std_msgs.msg import Int32`` like any other. Packages load a 
 
 What is named gets a full class. Messages that are only nested in others get a class with fields and nothing else, as
 the code of the outer message reads and writes them: that is what makes a type cheap on a heap of some kilobytes.
+
+Of constants a board keeps the names, so long lists of them cost more than all the code of a class: unless a program
+says which it uses, types with more than ``MOST_CONSTANTS`` bytes of them go without. ``constants_in`` finds those.
 """
 
 from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from pathlib import Path
 
 from muros.interfaces import _model as model
@@ -20,6 +23,7 @@ from muros.interfaces._board_code import Memo, Shared, read_lines, size_lines, w
 from muros.interfaces._layout import Leaf, Many, Text, leaves
 from muros.interfaces._model import (
     PRIMITIVES,
+    Constant,
     Field,
     InterfaceError,
     Kind,
@@ -46,6 +50,9 @@ _HELPERS = {
     "muros.cdr_lists": ("list_size", "put_sequence", "sequence", "sequence_size"),
 }
 
+MOST_CONSTANTS = 500  # bytes of a 32-bit heap: names, each with what its entry takes
+_ENTRY = 12
+
 _PACKAGE = """\
 def __getattr__(name):
     if name[0] == "_":
@@ -62,15 +69,17 @@ def generate(
     folder: str | os.PathLike[str],
     action_services: bool = False,
     registry: Registry | None = None,
+    constants: Container[str] | None = None,
 ) -> list[Path]:
     """Writes the modules of the named types and of all they need below a folder; returns the files, sorted.
 
     Types that the folder already has in full stay full. ``action_services`` adds the services and the message that
-    carry an action. Raises :class:`InterfaceError` for unknown types and for ``wstring``, which boards do not do.
+    carry an action. ``constants`` names those to keep; None keeps all but long lists. Raises :class:`InterfaceError`
+    for unknown types and for ``wstring``, which boards do not do.
     """
     root = Path(folder)
     written: set[Path] = set()
-    for path, text in sources(names, action_services, registry, root).items():
+    for path, text in sources(names, action_services, registry, root, constants).items():
         target = root / path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text, encoding="utf-8")
@@ -83,19 +92,34 @@ def sources(
     action_services: bool = False,
     registry: Registry | None = None,
     present: Path | None = None,
+    constants: Container[str] | None = None,
 ) -> dict[str, str]:
     """The modules that :func:`generate` writes: path -> text. ``present``: a folder whose full types stay full."""
-    work = _Work(registry or default_registry(), present)
+    work = _Work(registry or default_registry(), present, constants)
     for name in names:
         work.add(work.registry.full_name(name), action_services)
     return work.files()
 
 
+def without_constants(names: Iterable[str], registry: Registry | None = None) -> dict[str, int]:
+    """The types, of those named and all they need, whose constants are too many to be kept unasked: name -> number."""
+    work = _Work(registry or default_registry(), None, None)
+    for name in names:
+        work.add(work.registry.full_name(name), action_services=False)
+    return {m.name: len(m.constants) for m in work.messages() if m.constants and not work.constants(m)}
+
+
+def constants_in(program: str) -> frozenset[str]:
+    """The names in a program's text that may be those of constants: what ``constants`` takes."""
+    return frozenset(re.findall(r"\b[A-Za-z]\w*", program))
+
+
 class _Work:
     """The types to write: which in full, which only as what others hold."""
 
-    def __init__(self, registry: Registry, present: Path | None) -> None:
+    def __init__(self, registry: Registry, present: Path | None, constants: Container[str] | None) -> None:
         self.registry = registry
+        self._wanted = constants
         self._present = present
         self._modules: dict[str, list[Message]] = {}  # module path -> messages in it
         self._full: set[str] = set()
@@ -120,6 +144,17 @@ class _Work:
             if action_services:
                 lines += f"    SendGoal = {_short(name)}_SendGoal\n    GetResult = {_short(name)}_GetResult\n"
             self._tails.setdefault(_module(name), []).append(lines)
+
+    def messages(self) -> list[Message]:
+        """All that will be written, nested ones too."""
+        return [message for found in self._modules.values() for message in found]
+
+    def constants(self, message: Message) -> list[Constant]:
+        """The constants that the class of a message gets."""
+        if self._wanted is not None:
+            return [constant for constant in message.constants if constant.name in self._wanted]
+        long = sum(len(constant.name) + _ENTRY for constant in message.constants) > MOST_CONSTANTS
+        return [] if long else list(message.constants)
 
     def files(self) -> dict[str, str]:
         files: dict[str, str] = {}
@@ -197,7 +232,7 @@ class _Work:
         for name in shared:
             functions |= values.maker(name) | shared.functions(name, values.blank)
         lines = [f"class {_short(message.name)}:", f'    TYPE = "{message.name}"']
-        lines += [f"    {attribute(c.name)} = {_literal(c.value)}" for c in message.constants]
+        lines += [f"    {attribute(c.name)} = {_literal(c.value)}" for c in self.constants(message)]
         if message.fields:
             lines += self._init(message, values, len(memo.paths) if full else 0)
         return "\n".join(lines + methods) + "\n"
@@ -219,7 +254,7 @@ class _Work:
                 arguments.append(f"{name}={_literal(_plain(field))}")
             lines.append(f"self.{name} = {name}")
         if texts:
-            lines.append('self._memo = ["", b""]' + (f" * {texts}" if texts > 1 else ""))
+            lines.append(f"self._memo = [None] * {2 * texts}")
         return [f"    def __init__({', '.join(arguments)}):", *_indented(lines)]
 
 
