@@ -11,8 +11,13 @@ from muros.rtps import (
     DomainCore,
     DomainProblem,
     DomainSettings,
+    Durability,
     EndpointFound,
     EndpointLost,
+    EndpointQos,
+    Incompatible,
+    Liveliness,
+    LivelinessChanged,
     Locator,
     Matched,
     ParticipantChanged,
@@ -53,11 +58,7 @@ def test_two_processes_meet_and_exchange_samples() -> None:
     assert {sample.writer for sample in right.got[reader.guid]} == {writer.guid}
     assert writer.acknowledged
     (found,) = of(left.events[talker.prefix], ParticipantFound)
-    assert (found.participant.name, found.participant.user_data, found.local) == (
-        "listener",
-        b"enclave=/;",
-        False,
-    )
+    assert (found.participant.name, found.participant.user_data) == ("listener", b"enclave=/;")
     (endpoint,) = of(right.events[listener.prefix], EndpointFound)
     assert endpoint.endpoint == writer.data == listener.endpoint(writer.guid)
     assert endpoint.endpoint.user_data == b"typehash=x;"
@@ -83,12 +84,20 @@ def test_announcements_come_in_a_burst_and_then_with_a_steady_period() -> None:
     world.run(10 * SECOND)
     times = [datagram.sent_at for datagram in sent[::2]]  # multicast reaches two
     assert times == [0, 0.1e9, 0.25e9, 0.5e9, 1e9, 4e9, 7e9, 10e9]
-    start = world.network.now
-    left.participant(lease=3 * SECOND)
     sent.clear()
+    left.participant()
+    world.run(10 * SECOND)
+    second = [datagram.sent_at for datagram in sent if datagram.data[8:10] == b"\1\2"]
+    assert second == [10e9, 10e9]  # one of a process is enough
+
+
+def test_a_short_lease_makes_announcements_more_frequent() -> None:
+    world, left, _ = pair()
+    sent = world.record()
+    left.participant(lease=10 * SECOND)
     world.run(5 * SECOND)
-    times = [datagram.sent_at - start for datagram in sent if datagram.data[8:10] == b"\1\2"][::2]
-    assert times == [0, 0.1e9, 0.25e9, 0.5e9, 1e9, 2e9, 3e9, 4e9, 5e9]
+    times = [datagram.sent_at for datagram in sent[::2]]
+    assert times == [0, 0.1e9, 0.25e9, 0.5e9, 1e9, 3e9, 5e9]
 
 
 def test_participants_of_one_process_meet_without_a_network() -> None:
@@ -107,15 +116,72 @@ def test_participants_of_one_process_meet_without_a_network() -> None:
     assert [found.name for found in listener.participants] == [""]
 
 
-def test_participants_of_a_process_see_each_other_as_local() -> None:
+def test_participants_of_a_process_see_each_other_without_discovery() -> None:
     world = World()
     process = world.process()
     one, two = process.participant(), process.participant(name="two")
-    (found,) = of(process.events[one.prefix], ParticipantFound)
-    assert (found.participant, found.local) == (two.data, True)
+    writer = process.writer(two, user_data=b"x")
+    assert one.participants == (two.data,)
+    assert one.endpoints == (writer.data,)
+    assert two.endpoints == ()
+    assert one.endpoint(writer.guid) == writer.data
+    assert two.endpoint(writer.guid) is None
+    assert one.on_topic("rt/a") == two.on_topic("rt/a") == (writer.data,)
+    reader = process.reader(one)
+    assert of(process.events[one.prefix], Matched) == [Matched(reader.guid, writer.data)]
+    assert of(process.events[two.prefix], Matched) == [Matched(writer.guid, reader.data)]
+    other = process.reader(one, qos=EndpointQos(durability=Durability.TRANSIENT_LOCAL))
+    (told,) = of(process.events[two.prefix], Incompatible)
+    assert (told.local, told.remote, writer.refused[other.guid]) == (writer.guid, other.data, told.mismatches)
+    other.close(process.now)
+    assert writer.refused == {}
     two.close(process.now)
-    (lost,) = of(process.events[one.prefix], ParticipantLost)
-    assert (lost.participant, lost.why) == (two.data, Why.LEFT)
+    assert len(one.participants) == len(one.endpoints) == 0
+    assert of(process.events[one.prefix], Unmatched) == [Unmatched(reader.guid, writer.data, Why.LEFT)]
+    assert reader.matched == ()
+    assert len(process.core.registry) == 1
+
+
+def test_participants_of_a_process_say_nothing_to_each_other() -> None:
+    world = World()
+    process = world.process()
+    sent = world.record()
+    participants = [process.participant() for _ in range(20)]
+    for participant in participants:
+        process.writer(participant, qos=EndpointQos(lease=SECOND))
+    assert not process.core.inside
+    world.run(10 * SECOND)
+    announcements = 20 + 4 + 3  # each once; the first again in its burst, and every three seconds
+    assert len(sent) == announcements
+
+
+def test_liveliness_by_hand_is_known_within_a_process() -> None:
+    world = World()
+    process = world.process()
+    qos = EndpointQos(liveliness=Liveliness.MANUAL_BY_TOPIC, lease=SECOND)
+    one, two = process.participant(), process.participant()
+    writer, reader = process.writer(one, qos=qos), process.reader(two, qos=qos)
+    world.run(1500 * MS)
+    changes = of(process.events[two.prefix], LivelinessChanged)
+    assert changes == [LivelinessChanged(reader.guid, writer.guid, False)]
+    writer.write(payload(1), process.now)
+    changes = of(process.events[two.prefix], LivelinessChanged)
+    assert changes[1:] == [LivelinessChanged(reader.guid, writer.guid, True)]
+
+
+def test_when_the_first_participant_has_gone_the_next_announces_itself_to_all() -> None:
+    world, left, right = pair()
+    first, second = left.participant(), left.participant()
+    world.run(5 * SECOND)
+    first.close(left.now)
+    world.run(5 * SECOND)
+    late = right.participant()
+    right.core.set_addresses(
+        right.addresses._replace(announce_to=()), right.now
+    )  # it does not tell by itself
+    world.network.tap = lambda datagram: datagram.sender != right.meta or b"RTPS" not in datagram.data[:4]
+    world.run(3 * SECOND)
+    assert [found.prefix for found in late.participants] == [second.prefix]
 
 
 def test_many_readers_at_one_place_get_one_datagram() -> None:
@@ -240,15 +306,14 @@ def test_nothing_is_left_behind() -> None:
 
 def test_new_user_data_is_told() -> None:
     world, left, right = pair()
-    talker, sibling, listener = left.participant(), left.participant(), right.participant()
+    first, talker, listener = left.participant(), left.participant(), right.participant()
     world.run(SECOND)
-    before = talker.data
     talker.set_user_data(b"enclave=/x;", left.now)
     world.run(10 * MS)
-    for process, participant in ((right, listener), (left, sibling)):
-        (change,) = of(process.events[participant.prefix], ParticipantChanged)
-        assert (change.participant.user_data, change.before.user_data) == (b"enclave=/x;", b"")
-        assert change.before.prefix == before.prefix
+    (change,) = of(right.events[listener.prefix], ParticipantChanged)
+    assert (change.participant.user_data, change.before.user_data) == (b"enclave=/x;", b"")
+    assert change.before.prefix == talker.prefix
+    assert talker.data in first.participants
 
 
 def test_new_addresses_are_told_and_used() -> None:

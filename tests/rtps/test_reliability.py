@@ -302,7 +302,7 @@ def test_a_lost_reader_holds_nobody_for_ever() -> None:
         run(network, 100 * MS, a, b, c)
     assert [problem for problem, _, _ in a.problems] == [Problem.READER_STALLED]
     assert a.problems[0][1:] == (c.readers[READER].guid, 20)
-    assert 60 < accepted < 100
+    assert 40 < accepted < 60  # 20 at once, those of three seconds from 7 s on
     assert a.room >= 1
     run(network, 10 * SECOND, a, b)
     assert b.numbers() == list(range(1, accepted + 1))

@@ -166,7 +166,7 @@ def test_anything_said_is_a_sign_of_life() -> None:
         stranger.send(info_dst(participant.prefix))
     assert len(participant.participants) == 1
     world.run(2500 * MS)
-    assert participant.participants == ()
+    assert not participant.participants
 
 
 def test_one_that_comes_to_live_here_is_gone_elsewhere() -> None:

@@ -182,7 +182,7 @@ def test_those_who_stay_are_served_while_others_come_and_go(seed: int) -> None:
     for process in staying:
         for participant in process.core.participants:
             assert len(participant.participants) == 5
-        assert len(process.core.peers) == 6
+        assert len(process.core.peers) == 4
     assert {guid for _, writer in town.writers for guid in writer.matched} <= {
         reader.guid for _, reader in town.readers
     }

@@ -1,7 +1,8 @@
 """Says that a participant of ours is there (DDSI-RTPS 2.3, 8.5.3: the simple participant discovery protocol).
 
-Often in its first second, then with a steady period, to all addresses known in advance; to the participants
-that are known, where they listen, often enough for the lease; and at once to each that is met. Announcements have no
+One participant of a process does so often in its first second, then with a steady period, to all addresses known in
+advance; the others once. All do it to the participants that are known, where they listen, often enough for the lease;
+and at once to each that is met. Announcements have no
 acknowledgement: what is lost is said again. To one just met it is said again soon, unless it talks to us meanwhile:
 it may have begun to listen only after our answer.
 """
@@ -15,24 +16,28 @@ from muros.rtps._discovery_data import ParticipantData, departure
 from muros.rtps._domain_settings import DomainSettings
 from muros.rtps._endpoint import MILLISECOND, NEVER, SECOND, Send
 from muros.rtps._peer import Peer
-from muros.rtps._values import INFINITE, GuidPrefix, Locator
+from muros.rtps._values import GuidPrefix, Locator
 from muros.rtps._wire import data as data_submessage
 
 __all__ = ["Announcer", "Welcome"]
 
-SHARE: Final = 3
-"""Announcements within a lease, at least."""
+SHARE: Final = 5
+"""Announcements within a lease, at least: some may be lost."""
 
 AGAIN: Final = (100 * MILLISECOND, 400 * MILLISECOND, SECOND)
 """When after it was met a participant that does not talk to us is told again that we are there."""
 
 
 class Announcer(Timed):
-    """Announces one participant; put it on the agenda to make it begin."""
+    """Announces one participant; put it on the agenda to make it begin.
+
+    Of the participants of a process one leads: it announces itself again and again to those not known yet. Who hears
+    it answers, is known by that, and is told of all the others.
+    """
 
     __slots__ = (
-        "_burst", "_content", "_data", "_number", "_period", "_send", "_sequence", "_settings", "_told",
-        "announce_to", "peers",
+        "_anew", "_burst", "_changed", "_content", "_data", "_leads", "_number", "_period", "_send", "_sequence",
+        "_settings", "_told", "announce_to", "peers",
     )  # fmt: skip
 
     def __init__(
@@ -53,8 +58,13 @@ class Announcer(Timed):
         self.peers = peers
         self._number = number
         self._sequence = 0
+        self._leads = False
+        self._anew = True
+        self._changed = False
         self._told = -NEVER
+        self._burst: list[int] = []
         self.change(data, now)
+        self._changed = False
 
     @property
     def content(self) -> bytes:
@@ -66,22 +76,40 @@ class Announcer(Timed):
         self._data = data
         self._content = data.payload()
         self._sequence = self._number()
-        self._burst = [now + offset for offset in self._settings.announce_burst]
-        self._period = self._settings.announce_period
-        if data.lease < INFINITE:
-            self._period = max(1, min(self._period, data.lease // SHARE))
-        self._told = -NEVER
+        self._period = max(1, min(self._settings.announce_period, self._share()))
+        self._changed = True
+        self._begin(now)
+
+    def lead(self, now: int) -> None:
+        """It leads from now on."""
+        self._leads = True
+        self._begin(now)
 
     def wake(self, now: int) -> int:
-        places = dict.fromkeys(self.announce_to)
-        share = min(self._data.lease, self._settings.lease) // SHARE
-        if now + self._period - self._told > share:  # the next time would be too late
-            self._told = now
+        places: dict[Locator, None] = {}
+        if self._leads or self._anew:
+            places.update(dict.fromkeys(self.announce_to))
+        if now + self._period - self._told > self._share() or (self._changed and self._burst):
+            self._told = now  # the next time would be too late
             places.update(self._peers())
+        self._anew = False
         self._announce(places)
         while self._burst and self._burst[0] <= now:
             del self._burst[0]
-        return self._burst[0] if self._burst else now + self._period
+        if self._burst:
+            return self._burst[0]
+        self._changed = False
+        return now + (self._period if self._leads else self._share())
+
+    def _begin(self, now: int) -> None:
+        self._anew = True
+        self._told = -NEVER
+        offsets = self._settings.announce_burst
+        self._burst = [now + offset for offset in offsets] if self._leads or self._changed else []
+
+    def _share(self) -> int:
+        """The longest time in which those known have to be told once."""
+        return min(self._data.lease, self._settings.lease) // SHARE
 
     def tell(self, peer: Peer) -> None:
         """Announce it to one alone."""
@@ -102,9 +130,7 @@ class Announcer(Timed):
 
     def _peers(self) -> dict[Locator, None]:
         """Where others listen, each place once, in a fixed order."""
-        return dict.fromkeys(
-            place for peer in self.peers.values() if not peer.local for place in peer.discovery
-        )
+        return dict.fromkeys(place for peer in self.peers.values() for place in peer.discovery)
 
     def _announce(self, places: Iterable[Locator]) -> None:
         content = data_submessage(ENTITYID_SPDP_READER, ENTITYID_SPDP_WRITER, self._sequence, self._content)
@@ -129,10 +155,9 @@ class Welcome(Timed):
 
     def add(self, peer: Peer, now: int) -> None:
         """Somebody new is there."""
-        if not peer.local:
-            self._announcer.tell(peer)
-            self._due += [(now + offset, peer) for offset in AGAIN]
-            self._agenda.at(self, now + AGAIN[0])
+        self._announcer.tell(peer)
+        self._due += [(now + offset, peer) for offset in AGAIN]
+        self._agenda.at(self, now + AGAIN[0])
 
     def wake(self, now: int) -> int:
         peers = self._announcer.peers

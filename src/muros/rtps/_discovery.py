@@ -89,18 +89,21 @@ class Discovery(Timed):
     def __init__(self, owner: "ParticipantCore") -> None:
         super().__init__()
         self._owner = owner
-        self._domain = owner.owner
+        self._domain = owner.home
         self.known: dict[GuidPrefix, Known] = {}
         self._writers: dict[EntityId, WriterPort] = {}
         self._readers: dict[EntityId, ReaderPort] = {}
         self._paused: dict[GuidPrefix, None] = {}
         settings = self._domain.settings
-        for writer, reader, _, _ in _WRITERS:
+        send = self._domain.gatherer(owner.send)
+        lasts = self._domain.lasts(owner.prefix) or (0,) * len(_WRITERS)
+        for (writer, reader, _, _), last in zip(_WRITERS, lasts, strict=True):
             writing = self._writers[writer] = WriterPort(
                 WriterCore(
                     guid_of(owner.prefix, writer),
-                    owner.send,
+                    send,
                     transient_local=True,
+                    last=last,
                     settings=settings.discovery_writer,
                     report=owner.reporter(guid_of(owner.prefix, writer)),
                 )
@@ -112,7 +115,7 @@ class Discovery(Timed):
             self._readers[writer] = ReaderPort(
                 ReaderCore(
                     guid_of(owner.prefix, reader),
-                    owner.send,
+                    send,
                     deliver,
                     settings=settings.discovery_reader,
                     report=owner.reporter(guid_of(owner.prefix, reader)),
@@ -166,6 +169,7 @@ class Discovery(Timed):
 
     def close(self) -> None:
         """The participant has parted from all its peers."""
+        self._domain.ended(self._owner.prefix, tuple(port.core.last for port in self._writers.values()))
         for port in self._writers.values():
             self._domain.remove_writer(port)
             self._domain.agenda.forget(port)

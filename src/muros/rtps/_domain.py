@@ -5,9 +5,10 @@ writer of somebody else says, to the readers of ours that are matched with it; w
 ours that is named, or, where no participant is named, to those matched with that reader. What nobody is matched with
 is dropped and counted. Announcements of participants are heard here, for all of ours at once.
 
-Participants of this process are peers of each other like any others, but their datagrams do not leave: they wait in
-`inside` until the call that caused them has done its work, and so do events for owners, in `news`. Therefore nothing
-here is ever called from within itself, but for what users do while they take a sample.
+Participants of this process know each other without discovery (`_registry.py`), and what they say to each other does
+not leave: it waits in `inside` until the call that caused it has done its work, and so do events for owners, in `news`.
+Therefore nothing here is ever called from within itself, but for what users do while they take a sample. Discovery
+with others leaves at the end of a call, too, gathered by place (`_gather.py`).
 
 What comes from outside with the prefix of a participant of ours is an echo (multicast comes back) and dropped.
 """
@@ -23,13 +24,15 @@ from muros.rtps._discovery_data import EndpointData, InvalidDiscoveryData, Parti
 from muros.rtps._domain_settings import DOMAIN_DEFAULTS, NOWHERE, Addresses, DomainSettings, Transmit
 from muros.rtps._endpoint import MILLISECOND, SECOND, Send
 from muros.rtps._events import AckNack, Data, Event, InfoReply, InvalidMessage, NackFrag
+from muros.rtps._gather import Gather
 from muros.rtps._liveliness import WriterLease
-from muros.rtps._news import DomainProblem, DomainReport, ParticipantChanged, ParticipantEvent, Why
+from muros.rtps._news import DomainProblem, DomainReport, ParticipantEvent, Why
 from muros.rtps._parameters import InvalidParameters, status_info
 from muros.rtps._participant import ParticipantCore
 from muros.rtps._peer import Peer
 from muros.rtps._ports import FOR_READERS, ReaderPort, Route, WriterPort
 from muros.rtps._reach import INSIDE, Hosts
+from muros.rtps._registry import Registry
 from muros.rtps._values import EntityId, Guid, GuidPrefix, Locator, split_guid
 from muros.rtps._wire import info_dst, message, parse_untrusted
 
@@ -44,10 +47,13 @@ TOLD_MOST: Final = 256
 OVERTAKEN: Final = 2 * SECOND
 """For so long an announcement may be on its way that was overtaken by a newer one, or by a farewell."""
 
+LIVES_MOST: Final = 4096
+"""Participants of this process remembered that have ended."""
+
 GONE_MOST: Final = 256
 """Farewells remembered."""
 
-PARSED_MOST: Final = 256
+PARSED_MOST: Final = 2048
 """Announcements of endpoints remembered as parsed, since every participant of ours hears them."""
 
 PREFIX_SIZE: Final = 12
@@ -86,8 +92,10 @@ class DomainCore:
         self.hosts = Hosts(addresses)
         self.agenda = Agenda()
         self.peers: dict[GuidPrefix, Peer] = {}
+        self.registry = Registry()
         self.inside: deque[bytes] = deque()
         self.news: deque[tuple[Callable[[Any], object], Any]] = deque()
+        self.gathered: dict[Gather, None] = {}
         self._transmit = transmit
         self._report = report
         self._participants: dict[GuidPrefix, ParticipantCore] = {}
@@ -95,7 +103,9 @@ class DomainCore:
         self._writers: dict[_Key, WriterPort] = {}
         self._replies: dict[_Key, tuple[WriterPort, ...]] = {}
         self._reply: tuple[GuidPrefix, Locator] | None = None
+        self._lead: ParticipantCore | None = None
         self._number = 0
+        self._lives: dict[GuidPrefix, tuple[int, ...]] = {}
         self._gone: dict[GuidPrefix, tuple[int, int]] = {}
         self._parsed: dict[bytes, EndpointData] = {}
         self._told: dict[tuple[DomainProblem, GuidPrefix], int] = {}
@@ -150,13 +160,9 @@ class DomainCore:
             )
         )
         made = ParticipantCore(self, data, on_event, now)
-        peer = Peer(data, b"", None, now, None)
-        peer.locate(self.hosts)
-        self.peers[prefix] = peer
-        for sibling in self._participants.values():
-            sibling.meet(peer, now)
         self._participants[prefix] = made
         made.start(now)
+        self._choose_lead(now)
         self.finish()
         return made
 
@@ -169,7 +175,7 @@ class DomainCore:
             self._hear(datagram, source, now)
         finally:
             self.busy = False
-        if self.inside or self.news:
+        if self.inside or self.news or self.gathered:
             self.settle()
 
     def set_addresses(self, addresses: Addresses, now: int) -> None:
@@ -178,14 +184,11 @@ class DomainCore:
         self.addresses = addresses
         self.hosts = Hosts(addresses)
         for peer in self.peers.values():
-            if not peer.local:
-                self._locate(peer)
-                for participant in self._participants.values():
-                    participant.update(peer, None, now)
+            self._locate(peer)
+            for participant in self._participants.values():
+                participant.update(peer, None, now)
         for participant in self._participants.values():
-            data = self._addressed(participant.data)
-            self.peers[participant.prefix].data = data
-            participant.readdress(data, now)
+            participant.readdress(self._addressed(participant.data), now)
         self.finish()
 
     def tick(self, now: int) -> int | None:
@@ -210,7 +213,7 @@ class DomainCore:
 
     def finish(self) -> None:
         """The work of a call is done: hand over what has gathered."""
-        if (self.inside or self.news) and not self.busy:
+        if (self.inside or self.news or self.gathered) and not self.busy:
             self.settle()
 
     def settle(self) -> None:
@@ -225,6 +228,9 @@ class DomainCore:
                 elif inside and turn:
                     turn -= 1
                     self._hear(inside.popleft(), INSIDE, self.now)
+                elif self.gathered:
+                    gather, _ = self.gathered.popitem()
+                    gather.flush()
                 else:
                     break
         finally:
@@ -255,6 +261,33 @@ class DomainCore:
                 self.report(DomainProblem.QUEUE_FULL, prefix, counters["dropped"])
 
         return send
+
+    def gatherer(self, send: Send) -> Send:
+        """What the cores of a participant's discovery send through."""
+        gather, gathered = Gather(send), self.gathered
+
+        def collect(submessages: list[bytes], destination: GuidPrefix | None, place: Any) -> None:
+            if self._reply is not None and self._reply[0] == destination:
+                send(submessages, destination, place)
+            else:
+                gathered[gather] = None
+                gather(submessages, destination, place)
+
+        return collect
+
+    def ended(self, prefix: GuidPrefix, lasts: tuple[int, ...]) -> None:
+        """A participant ends: remember the numbers of the last samples of its discovery, to go on with if it returns.
+
+        Those who have missed its farewell would else take what it says then for old.
+        """
+        self._lives.pop(prefix, None)
+        if len(self._lives) >= LIVES_MOST:
+            del self._lives[next(iter(self._lives))]
+        self._lives[prefix] = lasts
+
+    def lasts(self, prefix: GuidPrefix) -> tuple[int, ...]:
+        """What `ended` was told of this one; nothing where it was not here yet."""
+        return self._lives.get(prefix, ())
 
     def number(self) -> int:
         """The number of a new announcement.
@@ -318,22 +351,15 @@ class DomainCore:
         if data is None:
             data = EndpointData.parse_untrusted(payload)
             if len(self._parsed) >= PARSED_MOST:
-                self._parsed.clear()
+                del self._parsed[next(iter(self._parsed))]
             self._parsed[payload] = data
         return data
-
-    def changed_here(self, participant: ParticipantCore, before: ParticipantData, now: int) -> None:
-        """A participant of ours says something else of itself."""
-        self.peers[participant.prefix].data = participant.data
-        for sibling in self._participants.values():
-            if sibling is not participant:
-                sibling.tell(ParticipantChanged(participant.data, before))
 
     def close_participant(self, participant: ParticipantCore, now: int) -> None:
         """Its owner takes it away."""
         participant.stop(now)
         del self._participants[participant.prefix]
-        self._lose(self.peers[participant.prefix], Why.LEFT, now)
+        self._choose_lead(now)
 
     def refuse(
         self, problem: DomainProblem, prefix: GuidPrefix, text: str, number: int | None = None
@@ -507,7 +533,7 @@ class DomainCore:
             self.counters["foreign"] += 1
         elif peer is not None:
             self._update(peer, data, event, source, now)
-        elif sum(not other.local for other in self.peers.values()) >= self.settings.peers:
+        elif len(self.peers) >= self.settings.peers:
             self.refuse(DomainProblem.TOO_MANY_PEERS, b"", prefix.hex(), self.settings.peers)
         else:
             self._meet(data, event, source, now)
@@ -573,6 +599,14 @@ class DomainCore:
         self.agenda.forget(peer)
         for participant in self._participants.values():
             participant.part(peer, why, now)
+
+    def _choose_lead(self, now: int) -> None:
+        """The participant that has been here longest announces itself to those not known yet."""
+        lead = next(iter(self._participants.values()), None)
+        if lead is not self._lead:
+            self._lead = lead
+            if lead is not None:
+                lead.lead(now)
 
     # --- Helpers -----------------------------------------------------------------------------------------
 

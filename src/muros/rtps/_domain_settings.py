@@ -44,7 +44,7 @@ class DomainSettings:
     announce_burst: tuple[int, ...] = (0, 100 * MILLISECOND, 250 * MILLISECOND, 500 * MILLISECOND, SECOND)
     """When after its start a participant announces itself, ..."""
     announce_period: int = 3 * SECOND
-    """... and how often from then on; at least three times in its lease."""
+    """... and how often from then on; at least five times in its lease."""
     peers: int = 512
     """Participants of others that are known at the same time."""
     endpoints_per_peer: int = 4096
@@ -65,7 +65,9 @@ class DomainSettings:
     """A shorter lease of a participant or of a writer's liveliness is taken as this."""
     writer: WriterSettings = WRITER_DEFAULTS
     reader: ReaderSettings = READER_DEFAULTS
-    discovery_writer: WriterSettings = field(default=WRITER_DEFAULTS)
+    discovery_writer: WriterSettings = field(
+        default_factory=lambda: WriterSettings(fragment_size=1300, heartbeat_period=100 * MILLISECOND)
+    )
     """Of the writers that tell of endpoints; one datagram of theirs has to pass every network."""
     discovery_reader: ReaderSettings = field(default_factory=lambda: ReaderSettings(memory=8 << 20))
 

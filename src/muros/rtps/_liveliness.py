@@ -72,13 +72,16 @@ class WriterLease(Timed):
 class OwnLease(Timed):
     """Whether a writer of ours with manual liveliness says in time that it is alive."""
 
-    __slots__ = ("_agenda", "_lease", "_on_loss", "alive", "seen", "total")
+    __slots__ = ("_agenda", "_lease", "_on_change", "alive", "seen", "total")
 
-    def __init__(self, lease: int, agenda: Agenda, on_loss: Callable[[int], object], now: int) -> None:
+    def __init__(
+        self, lease: int, agenda: Agenda, on_change: Callable[[bool, int], object], now: int
+    ) -> None:
+        """`on_change` is told whether it is alive, and how often it was not."""
         super().__init__()
         self._lease = lease
         self._agenda = agenda
-        self._on_loss = on_loss
+        self._on_change = on_change
         self.seen = now
         self.alive = True
         self.total = 0
@@ -90,13 +93,14 @@ class OwnLease(Timed):
         if not self.alive:
             self.alive = True
             self._agenda.at(self, now + self._lease)
+            self._on_change(True, self.total)
 
     def wake(self, now: int) -> int:
         if now - self.seen < self._lease:
             return self.seen + self._lease
         self.alive = False
         self.total += 1
-        self._on_loss(self.total)
+        self._on_change(False, self.total)
         return NEVER
 
 

@@ -58,17 +58,8 @@ class LocalWriter(WriterPort):
     """A writer of ours. Made by `ParticipantCore.writer`."""
 
     __slots__ = (
-        "_deadlines",
-        "_domain",
-        "_lease",
-        "_owner",
-        "_watched",
-        "closed",
-        "data",
-        "guid",
-        "refused",
-        "remotes",
-    )
+        "_deadlines", "_domain", "_lease", "_watched", "closed", "data", "guid", "owner", "refused", "remotes",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -82,7 +73,7 @@ class LocalWriter(WriterPort):
         on_room: Callable[[], object] | None,
     ) -> None:
         qos = data.qos
-        domain = owner.owner
+        domain = owner.home
         super().__init__(
             WriterCore(
                 data.guid,
@@ -106,7 +97,7 @@ class LocalWriter(WriterPort):
         """Matched readers."""
         self.refused: dict[Guid, tuple[Mismatch, ...]] = {}
         """Readers of its topic that do not match, and why."""
-        self._owner = owner
+        self.owner = owner
         self._domain = domain
         self._deadlines: Deadlines | None = None
         self._lease: OwnLease | None = None
@@ -121,7 +112,7 @@ class LocalWriter(WriterPort):
             self._lease = OwnLease(
                 max(qos.lease, domain.settings.lease_least),
                 domain.agenda,
-                lambda total: owner.tell(LivelinessLost(self.guid, total)),
+                self._alive_or_not,
                 now,
             )
         self._watched = self._deadlines is not None or qos.liveliness != Liveliness.AUTOMATIC
@@ -176,7 +167,7 @@ class LocalWriter(WriterPort):
             domain.agenda.at(self, core.due)
         if self._watched and sequence is not None:
             self._written(instance, now)
-        if (domain.inside or domain.news) and not domain.busy:
+        if (domain.inside or domain.news or domain.gathered) and not domain.busy:
             domain.settle()
         return sequence or 0
 
@@ -216,7 +207,7 @@ class LocalWriter(WriterPort):
     def close(self, now: int) -> None:
         """Take it away; others are told. What they have not acknowledged is lost. Closing twice is allowed."""
         if not self.closed:
-            self._owner.close_endpoint(self, now)
+            self.owner.close_endpoint(self, now)
             self._domain.finish()
 
     def stop(self) -> None:
@@ -261,9 +252,18 @@ class LocalWriter(WriterPort):
         if self.qos.liveliness != Liveliness.AUTOMATIC:
             self._assert(now)
 
+    def _alive_or_not(self, alive: bool, total: int) -> None:
+        """It has not said in time that it is alive, or says so again: readers of this process are told here."""
+        if not alive:
+            self.owner.tell(LivelinessLost(self.guid, total))
+        for guid in self.remotes:
+            reader = self._domain.registry.get(guid)
+            if isinstance(reader, LocalReader):
+                reader.owner.alive_or_not(reader, self.guid, alive)
+
     def _assert(self, now: int) -> None:
         if self.qos.liveliness == Liveliness.MANUAL_BY_PARTICIPANT:
-            self._owner.assert_manual(now)
+            self.owner.assert_manual(now)
         else:
             self.asserted(now)
 
@@ -272,8 +272,8 @@ class LocalReader(ReaderPort):
     """A reader of ours. Made by `ParticipantCore.reader`."""
 
     __slots__ = (
-        "_deadlines", "_domain", "_keyed", "_lifespans", "_on_sample", "_owner", "_plain", "closed", "data",
-        "guid", "outranked", "owners", "refused", "remotes",
+        "_deadlines", "_domain", "_keyed", "_lifespans", "_on_sample", "_plain", "closed", "data",
+        "guid", "outranked", "owner", "owners", "refused", "remotes",
     )  # fmt: skip
 
     def __init__(
@@ -285,7 +285,7 @@ class LocalReader(ReaderPort):
         settings: ReaderSettings,
     ) -> None:
         qos = data.qos
-        domain = owner.owner
+        domain = owner.home
         super().__init__(
             ReaderCore(
                 data.guid,
@@ -307,7 +307,7 @@ class LocalReader(ReaderPort):
         self.outranked = 0
         """Samples left out because a stronger writer owns their instance."""
         self.owners = Owners(domain.settings.instances) if qos.ownership == Ownership.EXCLUSIVE else None
-        self._owner = owner
+        self.owner = owner
         self._domain = domain
         self._on_sample = on_sample
         self._keyed = keyed(self.entity)
@@ -343,7 +343,7 @@ class LocalReader(ReaderPort):
     def close(self, now: int) -> None:
         """Take it away; others are told. Closing twice is allowed."""
         if not self.closed:
-            self._owner.close_endpoint(self, now)
+            self.owner.close_endpoint(self, now)
             self._domain.finish()
 
     def stop(self) -> None:
@@ -387,7 +387,7 @@ class LocalReader(ReaderPort):
         if (event.key or not event.payload) and not status:
             return True  # says nothing
         lifespan = self._lifespans.get(writer) if self._lifespans else None
-        expires = None if lifespan is None else self._domain.now + lifespan
+        expires = None if lifespan is None else self.core.arrived + lifespan
         received = Received(
             writer, event.sequence, event.payload, event.time, inline, status, instance, expires
         )
@@ -412,7 +412,7 @@ class LocalReader(ReaderPort):
     def _missed(self, total: int, instance: bytes) -> None:
         if self.owners is not None:
             self.owners.free(instance)
-        self._owner.tell(DeadlineMissed(self.guid, total, instance))
+        self.owner.tell(DeadlineMissed(self.guid, total, instance))
 
 
 def status_info_of(inline_qos: Parameters | None) -> int:

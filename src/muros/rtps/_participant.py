@@ -22,6 +22,7 @@ from muros.rtps._news import (
     Incompatible,
     LivelinessChanged,
     Matched,
+    Mismatch,
     ParticipantChanged,
     ParticipantEvent,
     ParticipantFound,
@@ -53,58 +54,67 @@ class ParticipantCore:
 
     def __init__(
         self,
-        owner: "DomainCore",
+        home: "DomainCore",
         data: ParticipantData,
         on_event: Callable[[ParticipantEvent], object] | None,
         now: int,
     ) -> None:
-        self.owner: Final = owner
+        self.home: Final = home
         """Its domain."""
         self.prefix: Final[GuidPrefix] = data.prefix
         self.guid: Final[Guid] = data.guid
-        self.domain: Final = owner.domain
+        self.domain: Final = home.domain
         self.data = data
         """What others are told of it."""
         self.on_event = on_event
         self.closed = False
-        self.send = owner.sender(self.prefix)
+        self.send = home.sender(self.prefix)
         """For its cores."""
         self._writers: dict[EntityId, LocalWriter] = {}
         self._readers: dict[EntityId, LocalReader] = {}
         self._locals: dict[str, list[LocalWriter | LocalReader]] = {}
-        self._topics: dict[str, dict[Guid, EndpointData]] = {}
+        self._topics: dict[str, dict[Guid, EndpointData]] = {}  # those of others
         self._leases: dict[GuidPrefix, dict[Guid, WriterLease]] = {}
         self._next_key = FIRST_KEY
         self._discovery = Discovery(self)
         self._announcer = Announcer(
-            data, self.send, owner.settings, owner.addresses.announce_to, owner.peers, owner.number, now
+            data, self.send, home.settings, home.addresses.announce_to, home.peers, home.number, now
         )
-        self._welcome = Welcome(self._announcer, owner.agenda, self._discovery.is_heard_by)
-        self._automatic = Assertions(False, owner.agenda, self._discovery.say_alive)
-        self._manual = Assertions(True, owner.agenda, self._discovery.say_alive)
+        self._welcome = Welcome(self._announcer, home.agenda, self._discovery.is_heard_by)
+        self._automatic = Assertions(False, home.agenda, self._discovery.say_alive)
+        self._manual = Assertions(True, home.agenda, self._discovery.say_alive)
 
     # --- What is there -----------------------------------------------------------------------------------
 
     @property
     def participants(self) -> tuple[ParticipantData, ...]:
         """All others that are there, those of this process included."""
-        return tuple(known.peer.data for known in self._discovery.known.values())
+        siblings = (other.data for other in self.home.participants if other is not self)
+        return (*siblings, *(known.peer.data for known in self._discovery.known.values()))
 
     @property
     def endpoints(self) -> tuple[EndpointData, ...]:
-        """All writers and readers of others."""
-        return tuple(
-            endpoint for known in self._discovery.known.values() for endpoint in known.endpoints.values()
+        """All writers and readers of others, those of this process included."""
+        siblings = (other for other in self.home.participants if other is not self)
+        return (
+            *(local.data for sibling in siblings for local in sibling.locals()),
+            *(endpoint for known in self._discovery.known.values() for endpoint in known.endpoints.values()),
         )
 
     def endpoint(self, guid: Guid) -> EndpointData | None:
         """The writer or reader of somebody else with this GUID; None = there is none."""
+        if guid[:12] == self.prefix:
+            return None
+        local = self.home.registry.get(guid)
+        if local is not None:
+            return local.data
         known = self._discovery.known.get(guid[:12])
         return None if known is None else known.endpoints.get(guid)
 
     def on_topic(self, topic: str) -> tuple[EndpointData, ...]:
-        """The writers and readers with this topic, its own included."""
-        return tuple(self._topics.get(topic, {}).values())
+        """The writers and readers with this topic, its own and those of this process included."""
+        ours = (local.data for local in self.home.registry.on_topic(topic))
+        return (*ours, *self._topics.get(topic, {}).values())
 
     @property
     def writers(self) -> tuple[LocalWriter, ...]:
@@ -158,8 +168,8 @@ class ParticipantCore:
             endpoint_qos=_inline_qos(topic, qos),
             on_room=on_room,
         )
-        self.owner.now = now
-        self.owner.add_writer(made)
+        self.home.now = now
+        self.home.add_writer(made)
         self._open(made, now)
         return made
 
@@ -190,46 +200,44 @@ class ParticipantCore:
             expects_inline_qos=expects_inline_qos,
         )
         made = self._readers[entity] = LocalReader(
-            self, data, on_sample, settings=settings or self.owner.settings.reader
+            self, data, on_sample, settings=settings or self.home.settings.reader
         )
-        self.owner.now = now
+        self.home.now = now
         self._open(made, now)
         return made
 
     def set_user_data(self, user_data: bytes, now: int) -> None:
         """Tell others different user data."""
-        self.owner.now = now
-        before, self.data = self.data, replace(self.data, user_data=user_data)
+        self.home.now = now
+        self.data = replace(self.data, user_data=user_data)
         self._announcer.change(self.data, now)
-        self.owner.agenda.at(self._announcer, now)
-        self.owner.changed_here(self, before, now)
-        self.owner.finish()
+        self.home.agenda.at(self._announcer, now)
+        self.home.finish()
 
     def assert_liveliness(self, now: int) -> None:
         """The participant, and so its writers with MANUAL_BY_PARTICIPANT liveliness, are alive."""
-        self.owner.now = now
+        self.home.now = now
         self.assert_manual(now)
-        self.owner.finish()
+        self.home.finish()
 
     def close(self, now: int) -> None:
         """Take it away with all it has; others are told. Closing twice is allowed."""
         if not self.closed:
-            self.owner.now = now
-            self.owner.close_participant(self, now)
-            self.owner.finish()
+            self.home.now = now
+            self.home.close_participant(self, now)
+            self.home.finish()
 
     # --- What its domain, discovery and endpoints do -----------------------------------------------------
 
     def start(self, now: int) -> None:
         """It has been added to the domain."""
-        for peer in self.owner.peers.values():
-            if peer.prefix != self.prefix:
-                self.meet(peer, now)
-        self.owner.agenda.at(self._announcer, now)
+        for peer in self.home.peers.values():
+            self.meet(peer, now)
+        self.home.agenda.at(self._announcer, now)
 
     def stop(self, now: int) -> None:
         """It is taken from the domain."""
-        for local in [local for locals_ in self._locals.values() for local in locals_]:
+        for local in self.locals():
             self.close_endpoint(local, now)
         self._announcer.leave()
         self.closed = True
@@ -237,14 +245,23 @@ class ParticipantCore:
             self._discovery.part(prefix, Why.CLOSED, now)
         self._discovery.close()
         for timed in (self._announcer, self._welcome, self._automatic, self._manual):
-            self.owner.agenda.forget(timed)
+            self.home.agenda.forget(timed)
+
+    def lead(self, now: int) -> None:
+        """From now on it is the one that announces itself to those not known yet."""
+        self._announcer.lead(now)
+        self.home.agenda.at(self._announcer, now)
+
+    def locals(self) -> list[LocalWriter | LocalReader]:
+        """Its writers and readers."""
+        return [*self._writers.values(), *self._readers.values()]
 
     def readdress(self, data: ParticipantData, now: int) -> None:
         """Its addresses have changed."""
-        self._announcer.announce_to = self.owner.addresses.announce_to
+        self._announcer.announce_to = self.home.addresses.announce_to
         self.data = data
         self._announcer.change(data, now)
-        self.owner.agenda.at(self._announcer, now)
+        self.home.agenda.at(self._announcer, now)
 
     def is_own_announcement(self, payload: bytes) -> bool:
         """Whether it has said this itself."""
@@ -252,7 +269,7 @@ class ParticipantCore:
 
     def meet(self, peer: Peer, now: int) -> None:
         """Somebody is there."""
-        self.tell(ParticipantFound(peer.data, peer.local))
+        self.tell(ParticipantFound(peer.data))
         self._welcome.add(peer, now)
         self._discovery.meet(peer, now)
 
@@ -273,7 +290,7 @@ class ParticipantCore:
     def tell(self, event: ParticipantEvent) -> None:
         """An event for the owner."""
         if self.on_event is not None and not self.closed:
-            self.owner.news.append((self.on_event, event))
+            self.home.news.append((self.on_event, event))
 
     def reporter(self, guid: Guid) -> Report:
         """What the core of the entity with this GUID reports to."""
@@ -283,14 +300,14 @@ class ParticipantCore:
 
         return report
 
-    def found(self, endpoint: EndpointData, peer: Peer | None, now: int) -> None:
-        """A writer or reader is there; `peer` None = of this participant itself."""
+    def found(self, endpoint: EndpointData, peer: Peer, now: int) -> None:
+        """A writer or reader of somebody else is there."""
         self._topics.setdefault(endpoint.topic, {})[endpoint.guid] = endpoint
         for local in self._locals.get(endpoint.topic, ()):
             if isinstance(local, LocalReader) == endpoint.is_writer:
                 self._compare(local, endpoint, peer, now)
 
-    def changed(self, endpoint: EndpointData, before: EndpointData, peer: Peer | None, now: int) -> None:
+    def changed(self, endpoint: EndpointData, before: EndpointData, peer: Peer, now: int) -> None:
         """One says something else of itself than before, or is to be reached elsewhere."""
         if endpoint is before:
             for local in self._locals.get(endpoint.topic, ()):
@@ -309,8 +326,7 @@ class ParticipantCore:
         for local in self._locals.get(endpoint.topic, ()):
             local.refused.pop(guid, None)
             if guid in local.remotes:
-                self._separate(local, endpoint, now)
-                self.tell(Unmatched(local.guid, endpoint, why))
+                self.separate(local, endpoint, why, now)
 
     def asserted(self, assertion: Assertion, now: int) -> None:
         """Somebody says that it, or what it speaks for, is alive."""
@@ -329,8 +345,9 @@ class ParticipantCore:
 
     def close_endpoint(self, local: LocalWriter | LocalReader, now: int) -> None:
         """A user takes away a writer or reader."""
-        self.owner.now = now
+        self.home.now = now
         data = local.data
+        self.home.registry.remove(local, now)
         for remote in tuple(local.remotes.values()):
             self._separate(local, remote, now)
         local.stop()
@@ -340,12 +357,11 @@ class ParticipantCore:
             del self._locals[data.topic]
         if isinstance(local, LocalWriter):
             del self._writers[local.entity]
-            self.owner.remove_writer(local)
+            self.home.remove_writer(local)
             self._watch_own(now)
         else:
             del self._readers[local.entity]
         self._discovery.withdraw(data, now)
-        self.lost(data, Why.LEFT, now)
 
     # --- Matching ----------------------------------------------------------------------------------------
 
@@ -356,22 +372,30 @@ class ParticipantCore:
         self._locals.setdefault(data.topic, []).append(local)
         if isinstance(local, LocalWriter):
             self._watch_own(now)
-        self.found(data, None, now)
-        for endpoint in tuple(self._topics[data.topic].values()):
+        self.home.registry.add(local, now)
+        for endpoint in tuple(self._topics.get(data.topic, {}).values()):
             if endpoint.is_writer == isinstance(local, LocalReader):
-                known = self._discovery.known.get(endpoint.guid[:12])
-                self._compare(local, endpoint, known.peer if known else None, now)
-        self.owner.finish()
+                self._compare(local, endpoint, self._discovery.known[endpoint.guid[:12]].peer, now)
+        self.home.finish()
 
-    def _compare(
-        self, local: LocalWriter | LocalReader, remote: EndpointData, peer: Peer | None, now: int
-    ) -> None:
-        """Match the two, or not, or no longer."""
-        guid = remote.guid
+    def _compare(self, local: LocalWriter | LocalReader, remote: EndpointData, peer: Peer, now: int) -> None:
+        """See whether one of ours and one of somebody else fit."""
         if isinstance(local, LocalWriter):
             reasons = _matching.mismatches(local.data, remote)
         else:
             reasons = _matching.mismatches(remote, local.data)
+        self.compared(local, remote, reasons, peer, now)
+
+    def compared(
+        self,
+        local: LocalWriter | LocalReader,
+        remote: EndpointData,
+        reasons: tuple[Mismatch, ...],
+        peer: Peer | None,
+        now: int,
+    ) -> None:
+        """Match the two, or not, or no longer; `peer` None = both are of this process."""
+        guid = remote.guid
         before = local.remotes.get(guid)
         if not reasons:
             local.refused.pop(guid, None)
@@ -380,8 +404,7 @@ class ParticipantCore:
                 self.tell(Matched(local.guid, remote))
             return
         if before is not None:
-            self._separate(local, before, now)
-            self.tell(Unmatched(local.guid, remote, Why.CHANGED))
+            self.separate(local, before, Why.CHANGED, now)
         local.refused[guid] = reasons
         self.tell(Incompatible(local.guid, remote, reasons))
 
@@ -389,11 +412,11 @@ class ParticipantCore:
         self, local: LocalWriter | LocalReader, remote: EndpointData, peer: Peer | None, now: int
     ) -> None:
         """The two fit: let them talk (or, if they do, over other addresses)."""
-        owner = self.owner
-        places = (INSIDE,) if peer is None else peer.places(remote, owner.hosts)
+        home = self.home
+        places = (INSIDE,) if peer is None else peer.places(remote, home.hosts)
         if isinstance(local, LocalWriter):
             local.remotes[remote.guid] = remote
-            owner.add_reply_route(remote.guid, local)
+            home.add_reply_route(remote.guid, local)
             local.core.match(
                 remote.guid,
                 places,
@@ -405,7 +428,7 @@ class ParticipantCore:
             )
         else:
             local.add(remote)
-            owner.add_route(remote.guid, local)
+            home.add_route(remote.guid, local)
             if peer is not None:
                 self._watch(local, remote, peer, now)
             local.core.match_writer(
@@ -415,18 +438,23 @@ class ParticipantCore:
                 reliable=remote.qos.reliable,
                 hello_base=1 if peer is None else peer.hello_base,
             )
-        owner.agenda.at(local, local.core.due)
+        home.agenda.at(local, local.core.due)
+
+    def separate(self, local: LocalWriter | LocalReader, remote: EndpointData, why: Why, now: int) -> None:
+        """They are not matched any more; tell the owner."""
+        self._separate(local, remote, now)
+        self.tell(Unmatched(local.guid, remote, why))
 
     def _separate(self, local: LocalWriter | LocalReader, remote: EndpointData, now: int) -> None:
         """They do not talk any more."""
         guid = remote.guid
         if isinstance(local, LocalWriter):
             del local.remotes[guid]
-            self.owner.remove_reply_route(guid, local)
+            self.home.remove_reply_route(guid, local)
             local.core.unmatch(guid, now)
         else:
             local.drop(guid)
-            self.owner.remove_route(guid, local)
+            self.home.remove_route(guid, local)
             local.core.unmatch_writer(guid)
             lease = self._lease(guid)
             if lease is not None:
@@ -440,7 +468,7 @@ class ParticipantCore:
         """Watch whether a writer is alive, if its lease ends."""
         guid, qos = remote.guid, remote.qos
         lease = self._lease(guid)
-        period = max(qos.lease, self.owner.settings.lease_least)
+        period = max(qos.lease, self.home.settings.lease_least)
         if lease is not None and (lease.kind, lease.lease) != (qos.liveliness, period):
             readers = lease.readers
             self._forget_lease(lease)
@@ -450,12 +478,10 @@ class ParticipantCore:
         if qos.lease >= INFINITE:
             return
         if lease is None:
-            lease = WriterLease(
-                guid, qos.liveliness, period, peer, self.owner.agenda, self._alive_or_not, now
-            )
+            lease = WriterLease(guid, qos.liveliness, period, peer, self.home.agenda, self._alive_or_not, now)
             lease.readers.update(readers)
             self._leases.setdefault(peer.prefix, {})[guid] = lease
-            self.owner.add_lease(lease)
+            self.home.add_lease(lease)
         lease.readers[local.guid] = None
 
     def _lease(self, writer: Guid) -> WriterLease | None:
@@ -466,16 +492,19 @@ class ParticipantCore:
         del leases[lease.guid]
         if not leases:
             del self._leases[lease.guid[:12]]
-        self.owner.remove_lease(lease)
-        self.owner.agenda.forget(lease)
+        self.home.remove_lease(lease)
+        self.home.agenda.forget(lease)
 
     def _alive_or_not(self, lease: WriterLease) -> None:
         """A writer of somebody else is alive again, or not any more."""
         for guid in lease.readers:
-            reader = self._readers.get(split_guid(guid)[1])
-            if reader is not None and reader.owners is not None and not lease.alive:
-                reader.owners.release(lease.guid)
-            self.tell(LivelinessChanged(guid, lease.guid, lease.alive))
+            self.alive_or_not(self._readers[split_guid(guid)[1]], lease.guid, lease.alive)
+
+    def alive_or_not(self, reader: LocalReader, writer: Guid, alive: bool) -> None:
+        """A writer that is matched with a reader of ours is alive again, or not any more."""
+        if reader.owners is not None and not alive:
+            reader.owners.release(writer)
+        self.tell(LivelinessChanged(reader.guid, writer, alive))
 
     def _watch_own(self, now: int) -> None:
         """Writers of ours have come or gone: say as often as they need that they are alive."""
@@ -508,7 +537,7 @@ class ParticipantCore:
 
     def _writer_settings(self, qos: EndpointQos) -> WriterSettings:
         """The domain's, with the resource limits of `qos`."""
-        settings = self.owner.settings.writer
+        settings = self.home.settings.writer
         if qos.limits is not None and qos.limits.max_samples > 0:
             settings = replace(settings, limit=qos.limits.max_samples)
         return settings

@@ -1,20 +1,19 @@
 """A participant that others see: where it is, how long it is believed to live, how much it may say."""
 
 from collections.abc import Callable
-from typing import Final
 
 from muros.rtps._agenda import Timed
 from muros.rtps._constants import VENDOR_EPROSIMA
 from muros.rtps._discovery_data import EndpointData, ParticipantData
 from muros.rtps._endpoint import NEVER, SECOND
-from muros.rtps._reach import INSIDE, Hosts
+from muros.rtps._reach import Hosts
 from muros.rtps._values import INFINITE, GuidPrefix, Locator
 
 __all__ = ["Budget", "Peer"]
 
 
 class Peer(Timed):
-    """A participant of another process, or one of this as its siblings see it (`local`).
+    """A participant of another process.
 
     Gone when nothing is heard of it in its lease, of whatever kind.
     """
@@ -39,7 +38,7 @@ class Peer(Timed):
         payload: bytes,
         source: Locator | None,
         now: int,
-        on_silence: Callable[["Peer", int], object] | None,
+        on_silence: Callable[["Peer", int], object],
     ) -> None:
         super().__init__()
         self.data = data
@@ -54,7 +53,6 @@ class Peer(Timed):
         self.seen = now
         """When something came from it."""
         self.lease = data.lease
-        self.local: Final = on_silence is None
         self.discovery: tuple[Locator, ...] = ()
         """Where discovery is sent."""
         self.user: tuple[Locator, ...] = ()
@@ -77,21 +75,18 @@ class Peer(Timed):
 
     def locate(self, hosts: Hosts) -> None:
         """Choose anew where to send to it."""
-        if self.local:
-            self.discovery = self.user = (INSIDE,)
-        else:
-            data = self.data
-            self.discovery = hosts.choose(data.metatraffic_unicast or data.default_unicast, self.source)
-            self.user = hosts.choose(data.default_unicast or data.metatraffic_unicast, self.source)
+        data = self.data
+        self.discovery = hosts.choose(data.metatraffic_unicast or data.default_unicast, self.source)
+        self.user = hosts.choose(data.default_unicast or data.metatraffic_unicast, self.source)
 
     def places(self, endpoint: EndpointData, hosts: Hosts) -> tuple[Locator, ...]:
         """Where to send to an endpoint of it: to its own addresses, else to its participant's."""
-        if self.local or not endpoint.unicast:
+        if not endpoint.unicast:
             return self.user
         return hosts.choose(endpoint.unicast, self.source) or self.user
 
     def wake(self, now: int) -> int:
-        if self._on_silence is None or self.lease >= INFINITE:
+        if self.lease >= INFINITE:
             return NEVER
         if now - self.seen < self.lease:
             return self.seen + self.lease

@@ -60,7 +60,8 @@ class ReaderCore:
     """
 
     __slots__ = (
-        "_deliver", "_entity", "_proxies", "_report", "_send", "_timed", "due", "guid", "reliable", "settings",
+        "_deliver", "_entity", "_proxies", "_report", "_send", "_timed", "arrived", "due", "guid", "reliable",
+        "settings",
     )  # fmt: skip
 
     def __init__(
@@ -82,6 +83,8 @@ class ReaderCore:
         self._report = report
         self._proxies: dict[tuple[GuidPrefix, EntityId], WriterProxy] = {}
         self._timed: dict[WriterProxy, None] = {}  # those that wait for a time
+        self.arrived = 0
+        """When the sample came that is being delivered."""
         self.due = NEVER
         """When `tick` is needed next, `NEVER` = not before something else happens."""
 
@@ -129,6 +132,7 @@ class ReaderCore:
             if proxy.pending:
                 self._tell(Problem.SAMPLES_LOST, proxy, len(proxy.pending))
             proxy.pending.clear()
+            proxy.came.clear()
             proxy.assemblies.clear()
             proxy.irrelevant.clear()
             proxy.held = 0
@@ -141,18 +145,20 @@ class ReaderCore:
         number = event.sequence
         if not proxy.reliable:
             if number >= proxy.expected:
+                self.arrived = now
                 self._deliver_newer(proxy, event)
         elif number == proxy.expected and not proxy.paused:
             if proxy.assemblies:
                 self._forget_assembly(proxy, number)
             if number <= proxy.asked_to:
                 proxy.progress = True
+            self.arrived = now
             if self._deliver(proxy.guid, event):
                 proxy.expected = number + 1
                 if proxy.pending or proxy.irrelevant:
                     self._advance(proxy)
             else:
-                self._hold(proxy, event)
+                self._hold(proxy, event, now)
                 proxy.paused = True
         else:
             self._take_early(proxy, event, now)
@@ -297,13 +303,14 @@ class ReaderCore:
         self._forget_assembly(proxy, number)
         if number <= proxy.asked_to:
             proxy.progress = True
-        self._hold(proxy, event)
+        self._hold(proxy, event, now)
         if proxy.held > self.settings.memory:
             self._make_room(proxy)
         self._overtaken(proxy, number, now)
 
-    def _hold(self, proxy: WriterProxy, event: Data) -> None:
+    def _hold(self, proxy: WriterProxy, event: Data, now: int) -> None:
         proxy.pending[event.sequence] = event
+        proxy.came[event.sequence] = now
         proxy.held += len(event.payload) + SAMPLE_COST
 
     def _advance(self, proxy: WriterProxy) -> None:
@@ -313,11 +320,13 @@ class ReaderCore:
             number = proxy.expected
             sample = pending.get(number)
             if sample is not None:
+                self.arrived = proxy.came[number]
                 if not self._deliver(proxy.guid, sample):
                     proxy.paused = True
                     break
                 if pending.pop(number, None) is None:
                     break  # the writer was taken away meanwhile
+                del proxy.came[number]
                 proxy.held -= len(sample.payload) + SAMPLE_COST
                 proxy.expected = number + 1
             elif number in irrelevant:
@@ -357,6 +366,7 @@ class ReaderCore:
             self._forget_assembly(proxy, number)
             sample = proxy.pending.pop(number, None)
             if sample is not None:
+                del proxy.came[number]
                 proxy.held -= len(sample.payload) + SAMPLE_COST
             dropped += before - proxy.held
         if dropped:

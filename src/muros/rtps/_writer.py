@@ -71,7 +71,7 @@ class WriterCore:
 
     __slots__ = (
         "_allowance", "_ask_at", "_ask_every", "_count", "_cursor", "_endpoint_qos", "_entity",
-        "_history", "_idle", "_lagging", "_leaving", "_lifespan", "_on_room", "_proxies", "_refused",
+        "_history", "_idle", "_lagging", "_leaving", "_lifespan", "_on_room", "_proxies", "_refused", "_refused_at",
         "_reliable", "_repairs", "_report", "_retains", "_routes", "_send", "_unasked", "_unsent",
         "_window", "_with_qos", "due", "guid", "last", "reliable", "sent", "settings",
     )  # fmt: skip
@@ -126,6 +126,7 @@ class WriterCore:
         self._ask_every = max(1, min(ASK_MOST, kept // 4))
         self._unasked = 0
         self._refused = False
+        self._refused_at = 0
         self.due = NEVER
         """When `tick` is needed next, `NEVER` = not before something else happens."""
 
@@ -246,7 +247,9 @@ class WriterCore:
                 self.due = min(self.due, sample.expires)
                 self._expire(now)
             if self._is_full() and not self._make_room(now):
-                self._refused = True
+                if not self._refused:
+                    self._refused = True
+                    self._refused_at = now
                 self.due = min(self.due, self._patience_ends())
                 return None
             self._history.add(sample)
@@ -568,7 +571,7 @@ class WriterCore:
             return True
         if not self._drop_acknowledged():
             for proxy in self._lagging:
-                if not proxy.aside and now - proxy.since >= self.settings.patience:
+                if self._refused and not proxy.aside and now >= self._tolerated(proxy):
                     proxy.aside = True
                     self._tell(Problem.READER_STALLED, proxy, self.sent - proxy.acked)
             self._drop_acknowledged()
@@ -600,8 +603,11 @@ class WriterCore:
 
     def _patience_ends(self) -> int:
         """When the next reader may be set aside."""
-        waiting = (proxy.since for proxy in self._lagging if not proxy.aside)
-        return min(waiting, default=NEVER - self.settings.patience) + self.settings.patience
+        return min((self._tolerated(proxy) for proxy in self._lagging if not proxy.aside), default=NEVER)
+
+    def _tolerated(self, proxy: ReaderProxy) -> int:
+        """Until when a reader may hold the writer: it is given time from the first sample that was refused."""
+        return max(proxy.since, self._refused_at) + self.settings.patience
 
     def _tell_room(self) -> None:
         self._refused = False

@@ -12,9 +12,9 @@ class WriterProxy:
     """One matched writer: where it is, what has come from it too early, what was asked of it."""
 
     __slots__ = (
-        "answer_at", "asked_at", "asked_to", "asks", "assemblies", "count", "entity", "expected", "floor",
-        "fragment_at", "fragment_count", "guid", "held", "hello_at", "hello_base", "hellos", "irrelevant", "last",
-        "owes", "paused", "pending", "places", "prefix", "progress", "reliable", "sent_count",
+        "answer_at", "asked_at", "asked_to", "asks", "assemblies", "came", "count", "entity", "expected",
+        "floor", "fragment_at", "fragment_count", "guid", "held", "hello_at", "hello_base", "hellos", "irrelevant",
+        "last", "owes", "paused", "pending", "places", "prefix", "progress", "reliable", "sent_count",
         "sent_fragment_count", "skip",
     )  # fmt: skip
 
@@ -31,7 +31,9 @@ class WriterProxy:
         self.last = 0
         """The last sample the writer is known to have sent."""
         self.pending: dict[int, Data] = {}
-        """Samples that came early, or were refused."""
+        """Samples that came early, or were refused, ..."""
+        self.came: dict[int, int] = {}
+        """... and when they came."""
         self.irrelevant: set[int] = set()
         """Numbers after the expected one that shall not be waited for."""
         self.skip = 0
