@@ -221,10 +221,10 @@ CLIENT_BUDGETS: tuple[Budget, ...] = (
         partial(with_tests, instructions, CONNECTED, "acknowledged()"),
     ),
     Budget(
-        "drift of the heap over 20 000 acknowledged messages",
+        "drift of the heap over 100 000 acknowledged messages",
         0,
         "B",
         GAUGE,
-        lambda: drift(CONNECTED, "acknowledged()", 20_000, _tests()),
+        lambda: drift(CONNECTED, "acknowledged()", 100_000, _tests()),
     ),
 )
