@@ -1,5 +1,6 @@
 """The commands against each other: processes of their own, in the ROS 2 graph of this host."""
 
+import base64
 import json
 import signal
 import subprocess
@@ -32,6 +33,18 @@ def test_what_pub_says_echo_prints(shell: Shell) -> None:
         assert echo.line("-") == "---\n"
         assert echo.stop() == (130, "")
         assert echo.err == ""
+
+
+def test_a_publisher_leaves_when_its_large_sample_has_arrived(
+    shell: Shell, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    file = tmp_path_factory.mktemp("large") / "large.yaml"
+    file.write_text(f"data: !!binary {base64.b64encode(bytes(1_000_000)).decode()}\n")
+    kind = "std_msgs/msg/UInt8MultiArray"
+    with shell.running(f"topic echo /large {kind} --once --no-arr --field data -l 1") as echo:
+        done = shell.run(f"topic pub --once --keep-alive 0 /large {kind} --yaml-file {file}")
+        assert done.returncode == 0
+        assert echo.out.read() == "- 0\n- '...'\n---\n"
 
 
 def test_a_publisher_is_seen_measured_and_gone(shell: Shell) -> None:

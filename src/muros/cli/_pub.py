@@ -142,9 +142,9 @@ async def _loop(
 
 
 async def _delivered(writer: Writer) -> None:
-    """Wait until reliable subscribers have got everything, as far as the engine knows; not for ever."""
+    """Wait until reliable subscribers have got everything; not for ever."""
     end = time.monotonic() + DELIVERY_TIME
-    while not getattr(writer, "acknowledged", True) and time.monotonic() < end:
+    while not writer.acknowledged and time.monotonic() < end:
         await asyncio.sleep(0.02)
 
 
