@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 import pytest
 
 from muros.rtps.net import NetworkSettings
-from muros.space import ClosedError, Qos, Space, SpaceError, Topic, open_space
+from muros.space import ClosedError, Matched, Qos, Space, SpaceError, Topic, open_space
 from tests.dds.domains import free_domain
 from tests.space.conformance import ADD, CHATTER, KEEP_ALL, LATCHED, RELIABLE, numbered, take_all
 
@@ -162,5 +162,46 @@ def test_a_closed_space_leaves_nothing_open(domain: int) -> None:
             one.participant("a").writer(CHATTER, Qos())
             two.participant("b").reader(CHATTER, Qos())
             await asyncio.sleep(0.01)
+
+    asyncio.run(main())
+
+
+@pytest.mark.parametrize("where", ["another's sample", "own sample", "match", "request"])
+def test_a_space_may_be_closed_in_its_callbacks(where: str, domain: int) -> None:
+    """Sockets, RTPS and caches are all in the middle of something then."""
+
+    async def main() -> None:
+        async with spaces(domain) as (one, two):
+            closed = asyncio.Event()
+
+            def close(*_: object) -> None:
+                two.close()
+                closed.set()
+
+            if where == "another's sample":
+                writer = one.participant("talker").writer(CHATTER, RELIABLE)
+                two.participant("listener").reader(CHATTER, RELIABLE, close)
+                await until(lambda: writer.matched)
+                for _ in range(5):
+                    writer.write(b"x")
+            elif where == "own sample":
+                node = two.participant("node")
+                node.reader(CHATTER, RELIABLE, close)
+                node.writer(CHATTER, RELIABLE).write(b"x")
+                await asyncio.sleep(0.01)
+                if not two.closed:
+                    node.writer(CHATTER, LATCHED).write(b"x")
+            elif where == "match":
+                two.graph.watch(lambda event: close() if isinstance(event, Matched) else None)
+                one.participant("talker").writer(CHATTER, RELIABLE)
+                two.participant("listener").reader(CHATTER, RELIABLE)
+            else:
+                two.participant("server").replier(ADD, None, close)
+                one.participant("client").requester(ADD).send(b"?")
+            async with asyncio.timeout(20):
+                await closed.wait()
+            await asyncio.sleep(0.05)
+            codes = {f.code for f in (*one.findings.snapshot(), *two.findings.snapshot())}
+            assert codes <= {"dds-receive-buffer-small"}
 
     asyncio.run(main())
