@@ -190,6 +190,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--seconds", type=float, default=2.0, help="duration of each measure")
+    parser.add_argument(
+        "--runs", type=int, default=2, help="runs of each measure; the best of each figure counts"
+    )
     parser.add_argument("--only", choices=SECTIONS, action="append", help="these sections")
     parser.add_argument("--with", dest="those", default=",".join(PEERS), help="these implementations")
     parser.add_argument("--json", type=Path, help="write the figures there")
@@ -200,7 +203,10 @@ def main() -> None:
     for section in options.only or SECTIONS:
         measure, sizes, figures = SECTIONS[section]
         for size in sizes:
-            got = {name: measure(name, size, options.seconds) for name in those}
+            runs = [
+                {name: measure(name, size, options.seconds) for name in those} for _ in range(options.runs)
+            ]
+            got = {name: _best([run[name] for run in runs], figures) for name in those}
             rows += [{"section": section, "size": size, "implementation": n, **got[n]} for n in got]
             for key, (label, form, more) in figures.items():
                 values = {name: got[name][key] for name in those}
@@ -208,6 +214,13 @@ def main() -> None:
                 print(f"{label + f', {size} B':38}{line}   {_compared(values, more)}", flush=True)
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1))
+
+
+def _best(runs: list[dict[str, float]], figures: dict[str, tuple[str, str, bool]]) -> dict[str, float]:
+    """The best of each figure."""
+    return {
+        key: (max if key in figures and figures[key][2] else min)(run[key] for run in runs) for key in runs[0]
+    }
 
 
 def _compared(values: dict[str, float], more: bool) -> str:

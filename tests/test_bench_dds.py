@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 @pytest.fixture(scope="module")
 def rows(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     path = tmp_path_factory.mktemp("bench") / "rows.json"
-    options = ["--seconds", "0.2", "--with", "muros,rtps", "--json", str(path)]
+    options = ["--seconds", "0.2", "--runs", "1", "--with", "muros,rtps", "--json", str(path)]
     command = [sys.executable, "bench/bench_dds.py", *options]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=58, check=False)
     assert done.returncode == 0, done.stderr
