@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from muros import interfaces
@@ -63,6 +63,7 @@ def plain(name: str) -> st.SearchStrategy[dict[str, Any]]:
 
 
 @pytest.mark.parametrize("name", KINDS)
+@settings(max_examples=30)
 @given(data=st.data())
 def test_what_echo_prints_pub_reads(name: str, data: st.DataObject) -> None:
     made = interfaces.message(name)
