@@ -54,22 +54,6 @@ class TestDds(VirtualTime):
         """Requests name the reader that waits for the reply, as ROS 2 wants it."""
         return identity_of(requester.gid[:15] + b"\x04", number)
 
-    def test_patience_begins_anew_after_room(self, space: Space) -> None:
-        """Patience counts from the reader's last acknowledgement, whenever the writer is refused."""
-        writer = space.participant("talker").writer(CHATTER, KEEP_ALL)
-        reader = space.participant("listener").reader(CHATTER, KEEP_ALL)
-        self.settle(space)
-        while writer.write(b"x"):
-            self.settle(space)
-        for _ in range(3):
-            assert reader.take() is not None
-            self.settle(space)
-            assert writer.write(b"x")
-            assert not writer.write(b"x"), "full again"
-            self.pass_time(space, self.PATIENCE - 1)
-            assert not writer.write(b"x")
-        assert reader.lost == 0
-
     def test_a_stuck_reader_holds_up_others_only_for_a_while(self, space: Space, told: list[Finding]) -> None:
         """What is under way to the stuck reader waits for it: it loses less than in a space of one process."""
         writer = space.participant("talker").writer(CHATTER, KEEP_ALL)

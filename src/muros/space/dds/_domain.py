@@ -278,8 +278,7 @@ class DdsDomain:
                 handle(self, participant, event)
 
     def _participant_found(self, participant: DdsParticipant, event: ParticipantFound) -> None:
-        if not event.local:
-            self._find(event.participant)
+        self._find(event.participant)
 
     def _participant_changed(self, participant: DdsParticipant, event: ParticipantChanged) -> None:
         remote = self.remotes.get(event.participant.prefix)
