@@ -1,14 +1,51 @@
 """What MicroPython has and CPython lacks, for ``compat``."""
 
 import time
-from os import urandom
+from importlib import import_module
 
-__all__ = ["const", "copy", "sleep_ms", "ticks_add", "ticks_diff", "ticks_ms", "ticks_us", "urandom"]
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # typing would be the slowest part of `import muros`
+    from types import ModuleType
+    from typing import Any
+
+__all__ = [
+    "borrow",
+    "const",
+    "copy",
+    "lend",
+    "loans",
+    "release",
+    "sleep_ms",
+    "ticks_add",
+    "ticks_diff",
+    "ticks_ms",
+    "ticks_us",
+]
+
+loans: list[str] = []
+"""Hosts forget no module."""
 
 
 def const(value: int) -> int:
     """Marks a module constant; MicroPython folds ``_NAME = const(n)`` away at compile time."""
     return value
+
+
+def borrow(name: str) -> "ModuleType":
+    """A module; boards drop it when nobody refers to it any more, hosts keep it."""
+    return import_module(name)
+
+
+def release() -> None:
+    """Boards forget what was borrowed."""
+
+
+def lend(owner: object, module: str, name: str) -> "Any":
+    """``owner``'s method ``name``: a function of a module, which takes ``owner`` first."""
+    method = None if name.startswith("_") else getattr(import_module(module), name, None)
+    if method is None:
+        raise AttributeError(f"{type(owner).__name__!r} object has no attribute {name!r}")
+    return lambda *given, **named: method(owner, *given, **named)
 
 
 def ticks_ms() -> int:

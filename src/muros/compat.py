@@ -5,6 +5,11 @@ The modules of the board floor import from here and nowhere ask which interprete
 
 Time on the board floor is counted in *ticks*: integer milliseconds that wrap on boards, so they are only ever
 compared with :func:`ticks_diff` and moved with :func:`ticks_add`.
+
+A board keeps in memory what runs for each message and each turn while it is connected. The rest, what makes, connects,
+mends and closes, is *borrowed*: :func:`borrow` imports a module, :func:`release` forgets all that were borrowed and
+what they imported at their top, so that their memory is free again unless somebody holds on to them. With :func:`lend`
+an object has methods that live in a borrowed module. On hosts borrowing is importing.
 """
 
 import sys
@@ -12,15 +17,42 @@ import sys
 MPY = sys.implementation.name == "micropython"
 
 if MPY:
+    from gc import collect
     from time import (  # type: ignore[attr-defined]
         sleep_ms,  # noqa: F401
         ticks_add,  # noqa: F401
         ticks_diff,  # noqa: F401
         ticks_ms,  # noqa: F401
-        ticks_us,
+        ticks_us,  # noqa: F401
     )
 
     from micropython import const  # type: ignore[import-not-found] # noqa: F401
+
+    loans: "list[str]" = []
+
+    def borrow(name):  # type: ignore[no-untyped-def]
+        """A module, until ``release``."""
+        if name not in sys.modules:
+            collect()
+            known = set(sys.modules)
+            __import__(name)
+            for other in sys.modules:
+                if other not in known and other.startswith("muros."):
+                    loans.append(other)
+        return sys.modules[name]
+
+    def release():  # type: ignore[no-untyped-def]
+        """Forgets what was borrowed."""
+        while loans:
+            name = loans.pop()
+            del sys.modules[name]
+            at = name.rfind(".")
+            delattr(sys.modules[name[:at]], name[at + 1 :])
+
+    def lend(owner, module, name):  # type: ignore[no-untyped-def]
+        """``owner``'s method ``name``: a function of a borrowed module, which takes ``owner`` first."""
+        method = getattr(borrow(module), name)
+        return lambda *given, **named: method(owner, *given, **named)
 
     def copy(target, at, source, start, n):  # type: ignore[no-untyped-def]
         """Copies ``n`` bytes; a part of the source would be allocated on the heap first."""
@@ -30,13 +62,6 @@ if MPY:
             while n:
                 n -= 1
                 target[at + n] = source[start + n]
-
-    try:
-        from os import urandom
-    except ImportError:  # a build without a source of entropy: the time since power-on has to do
-
-        def urandom(n):  # type: ignore[no-untyped-def]
-            return ticks_us().to_bytes(4, "little")[:n]
 
 else:
     from muros._host import *  # noqa: F403

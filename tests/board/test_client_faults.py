@@ -66,7 +66,7 @@ def test_a_refused_writer_refuses() -> None:
     agent.kind = 5
     board.session.transport = agent
     board.session.send = agent.send
-    late = board.session.writer(board.session.entities[0], "rt/late", "std_msgs/msg/Int32")  # type: ignore[arg-type]
+    late = board.session.writer(board.session.entities[0], "rt/late", "std_msgs/msg/Int32")
     agent._expected = board.session.reliable.next
     agent._next = board.session.inputs[0x80].expected
     settle(board)
@@ -77,7 +77,7 @@ def test_a_refused_writer_refuses() -> None:
 
 def test_reading_again_keeps_the_answers_of_others() -> None:
     board = Board()
-    late = board.session.writer(board.session.entities[0], "rt/late", "std_msgs/msg/Int32")  # type: ignore[arg-type]
+    late = board.session.writer(board.session.entities[0], "rt/late", "std_msgs/msg/Int32")
     board.session.spin_once(board.now)
     board.reader.read(5)
     settle(board)
@@ -88,7 +88,7 @@ def test_reading_again_keeps_the_answers_of_others() -> None:
 def test_request_ids_wrap() -> None:
     board = Board()
     requester = board.session.requester(
-        board.session.entities[0],  # type: ignore[arg-type]
+        board.session.entities[0],
         "/add",
         "example_interfaces/srv/AddTwoInts",
         lambda number, buf, off, n: None,
@@ -109,7 +109,7 @@ def test_a_callback_that_raises_has_had_its_sample() -> None:
         board.heard += 1
         raise RuntimeError("no")
 
-    board.reader.on_data = bad
+    board.reader.deliver = bad
     board.agent.inbox.append(board.agent.data(_READER, b"\1\0\0\0"))
     board.agent.inbox.append(board.agent.data(_READER, b"\2\0\0\0"))
     with raises(RuntimeError):

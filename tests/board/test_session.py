@@ -1,15 +1,17 @@
 """A session without I/O, as both roles see it: messages in, answers out. See also ``tests/xrce/test_session.py``."""
 
 from muros.compat import const
+from muros.xrce import inputs
+from muros.xrce.beginning import begin, flush, reset, stranger
 from muros.xrce.fragments import Cutter
-from muros.xrce.inputs import Input
-from muros.xrce.outputs import Output
+from muros.xrce.outputs import make
 from muros.xrce.session import SessionCore
 from tests.board.harness import allocates
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.xrce._types import Buffer
+    from muros.xrce.streams import Input
 
 MTU = 64
 HANDLED, FAILED, LATER = 0, 1, 2
@@ -20,22 +22,28 @@ class End(SessionCore):
     """One end: keeps what it sends and what it handles. ``answers`` are given to submessages in turn, then HANDLED."""
 
     def __init__(self, session_id: int = 0x81, grows: bool = True, largest: int = 4096) -> None:
-        super().__init__(session_id, KEY, self._keep, self._take, largest)
+        begin(self, session_id, KEY, self._keep, self._take, largest)
         self.sent: "list[bytes]" = []
         self.got: "list[tuple[int, bytes, int]]" = []
         self.answers: "list[int]" = []
         self.passed_over: "list[int]" = []
         self.stop_at_failure = False
         self._grows = grows
-        self.outputs[0x80] = Output(0x80, MTU, self.head, 4, 100)
-        self.outputs[1] = Output(1, MTU, self.head)
+        self.outputs[0x80] = make(0x80, MTU, self.head, 4, 100)
+        self.outputs[1] = make(1, MTU, self.head)
 
     def make_input(self, stream_id: int) -> "Input | None":
         if not self._grows:
             return None
-        stream = Input(stream_id, MTU, 16) if stream_id >= 0x80 else Input(stream_id)
+        stream = inputs.make(stream_id, MTU, 16) if stream_id >= 0x80 else inputs.make(stream_id)
         self.inputs[stream_id] = stream
         return stream
+
+    def flush(self, now: int) -> None:
+        flush(self, now)
+
+    def stranger(self, buf: "Buffer", at: int) -> None:
+        stranger(self, buf, at)
 
     def too_long(self, stream_id: int, n: int) -> None:
         self.passed_over.append(n)
@@ -191,7 +199,7 @@ def test_control_messages_with_key() -> None:
     end.write(b"b")
     end.flush(0)
     assert end.take() == [b"\x01\x80\0\0" + KEY + submessage(7, b"b")]
-    end.heartbeats(100)
+    end.flush(100)
     assert end.take() == [b"\x01\0\0\0" + KEY + b"\x0b\x01\x05\x00\x00\x00\x00\x00\x80"]
 
 
@@ -273,15 +281,15 @@ def test_heartbeats_name_what_is_unacknowledged() -> None:
         end.write(body * 40)
     end.flush(0)
     assert len(end.take()) == 3
-    end.heartbeats(99)
+    end.flush(99)
     assert end.take() == []
-    end.heartbeats(100)
+    end.flush(100)
     assert end.take() == [heartbeat(65534, 0)]
     end.tell(acknack(65535, 0), 150)
-    end.heartbeats(250)
+    end.flush(250)
     assert end.take() == [heartbeat(65535, 0)]
     end.tell(acknack(1, 0), 251)
-    end.heartbeats(1000)
+    end.flush(1000)
     assert end.take() == []
 
 
@@ -322,7 +330,7 @@ def test_reset_in_a_message_begins_with_number_0() -> None:
 
     def handle(kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
         if kind == 12:
-            end.reset()
+            reset(end)
         else:
             end.got.append((kind, bytes(buf[off : off + n]), stream_id))
         return HANDLED
@@ -526,8 +534,8 @@ def test_a_cut_sample_keeps_its_place_among_others() -> None:
 
 
 def test_receiving_a_sample_does_not_allocate() -> None:
-    end = SessionCore(0x81, None, quiet, ignore, 0)
-    stream = end.inputs[0x80] = Input(0x80, MTU, 4)
+    end = Quiet()
+    stream = end.inputs[0x80] = inputs.make(0x80, MTU, 4)
     message_of_mine = bytearray(data(0, b"abcdefgh"))
 
     def call() -> None:
@@ -537,6 +545,13 @@ def test_receiving_a_sample_does_not_allocate() -> None:
 
     assert allocates(call) == 0
     assert stream.expected >= 1
+
+
+class Quiet(SessionCore):
+    """A session that says nothing and handles everything."""
+
+    def __init__(self) -> None:
+        begin(self, 0x81, None, quiet, ignore, 0)
 
 
 def quiet(buf: "Buffer", off: int, n: int) -> None:

@@ -1,13 +1,15 @@
 """Streams by themselves: windows, numbers that wrap, bitmaps, repetitions. See also ``tests/xrce/test_streams.py``."""
 
 from muros.compat import const
-from muros.xrce.inputs import Input
-from muros.xrce.outputs import Output
+from muros.xrce import inputs, outputs
+from muros.xrce.mending import accept, advance, announce, missing, resend
 from tests.board.harness import allocates, raises
+from tests.board.test_session import End, message, submessage
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
-    from muros.xrce._types import Buffer
+    from muros.xrce._types import Buffer, Send
+    from muros.xrce.streams import Input, Output
 
 NEAR_WRAP = 65500
 
@@ -28,14 +30,14 @@ class Line:
         return taken
 
 
-def output(history: int = 4, mtu: int = 32, start: int = 0) -> Output:
+def output(history: int = 4, mtu: int = 32, start: int = 0) -> "Output":
     """A sender that has sent and got acknowledged everything before ``start``."""
-    stream = Output(0x80, mtu, bytearray(b"\x81\0\0\0"), history, 100)
+    stream = outputs.make(0x80, mtu, bytearray(b"\x81\0\0\0"), history, 100)
     stream.next = stream.first = stream.sent = start
     return stream
 
 
-def fill(stream: Output, n: int = 8) -> bool:
+def fill(stream: "Output", n: int = 8) -> bool:
     """Puts one submessage of ``n`` bytes into the stream, its bytes all equal to its number."""
     number = stream.next
     at = stream.reserve(n)
@@ -51,38 +53,50 @@ def fill(stream: Output, n: int = 8) -> bool:
     return True
 
 
-def receiver(window: int = 16, start: int = 0) -> Input:
+def acknowledge(stream: "Output", first: int, bitmap: int, send: "Send", now: int) -> bool:
+    """What a session does with an ACKNACK."""
+    known = stream.acknowledge(first, send, now)
+    if known and bitmap:
+        resend(stream, bitmap, send, now)
+    return known
+
+
+def receiver(window: int = 16, start: int = 0) -> "Input":
     """A receiver that expects ``start``."""
-    stream = Input(0x80, 32, window)
+    stream = inputs.make(0x80, 32, window)
     stream.expected = start
     return stream
 
 
-def take(stream: Input, number: int) -> "list[int]":
+def take(stream: "Input", number: int) -> "list[int]":
     """One message arrives; the numbers that were handled because of it."""
     number &= 0xFFFF
     handled: "list[int]" = []
-    if stream.accept(number, bytes((number & 255, number >> 8)), 0, 2):
+    if accept(stream, number, bytes((number & 255, number >> 8)), 0, 2):
         handled.append(number)
-        stream.advance(1)
+        advance(stream, 1)
         handled += kept(stream)
     return handled
 
 
-def kept(stream: Input) -> "list[int]":
+def kept(stream: "Input") -> "list[int]":
     """The numbers of messages that are kept and in order now, and are handled."""
     handled: "list[int]" = []
     while stream.expected in stream.early:
         body = stream.early[stream.expected]
         assert len(body) == 2
         handled.append(body[0] | body[1] << 8)
-        stream.advance(1)
+        advance(stream, 1)
     return handled
 
 
-def newer(stream: Input, *numbers: int) -> "list[bool]":
-    """Whether a best-effort stream takes each of these."""
-    return [stream.accept(number, b"", 0, 0) for number in numbers]
+def newer(end: End, *numbers: int) -> "list[bool]":
+    """Whether a session handles each of these messages of a best-effort stream."""
+    taken = []
+    for number in numbers:
+        end.tell(message(1, number, submessage(7, b"x")))
+        taken.append(end.bodies() == [b"x"])
+    return taken
 
 
 # best effort
@@ -90,7 +104,7 @@ def newer(stream: Input, *numbers: int) -> "list[bool]":
 
 def test_best_effort_numbers_count_and_wrap() -> None:
     line = Line()
-    stream = Output(1, 32, bytearray(b"\x81\0\0\0"))
+    stream = outputs.make(1, 32, bytearray(b"\x81\0\0\0"))
     stream.next = stream.first = stream.sent = 65534
     for _ in range(4):
         assert fill(stream)
@@ -101,7 +115,7 @@ def test_best_effort_numbers_count_and_wrap() -> None:
 
 def test_best_effort_packs_until_the_mtu() -> None:
     line = Line()
-    stream = Output(1, 32, bytearray(b"\x81\0\0\0"))
+    stream = outputs.make(1, 32, bytearray(b"\x81\0\0\0"))
     assert fill(stream, 5)  # 4 + 4 + 5 = 13
     assert fill(stream, 8)  # 16 + 4 + 8 = 28
     assert not fill(stream, 1)  # 28 + 4 + 1 = 33
@@ -112,7 +126,7 @@ def test_best_effort_packs_until_the_mtu() -> None:
 
 
 def test_best_effort_refuses_what_never_fits() -> None:
-    stream = Output(1, 32, bytearray(b"\x81\0\0\0"))
+    stream = outputs.make(1, 32, bytearray(b"\x81\0\0\0"))
     assert stream.capacity() == 24
     assert fill(stream, 24)
     stream.reset()
@@ -120,17 +134,17 @@ def test_best_effort_refuses_what_never_fits() -> None:
 
 
 def test_best_effort_takes_only_what_is_newer() -> None:
-    stream = Input(1)
-    assert newer(stream, 0, 0, 1, 5, 4, 6) == [True, False, True, True, False, True]
-    assert stream.lost == 3
-    stream.expected = 0
-    assert newer(stream, 65535, 65000, 0) == [False, False, True]
+    end = End()
+    assert newer(end, 0, 0, 1, 5, 4, 6) == [True, False, True, True, False, True]
+    assert end.inputs[1].lost == 3
+    end.inputs[1].expected = 0
+    assert newer(end, 65535, 65000, 0) == [False, False, True]
 
 
 def test_best_effort_half_the_numbers_are_newer() -> None:
-    stream = Input(1)
-    stream.expected = 1
-    assert newer(stream, 0x8000, 0x7FFF) == [False, True]
+    end = End()
+    newer(end, 0)
+    assert newer(end, 0x8000, 0x7FFF) == [False, True]
 
 
 # reliable, as sender
@@ -139,7 +153,7 @@ def test_best_effort_half_the_numbers_are_newer() -> None:
 def test_history_must_be_a_power_of_two() -> None:
     for wrong in (0, 3, 5, 0x8000):
         with raises(ValueError):
-            Output(0x80, 32, bytearray(4), wrong, 100)
+            outputs.make(0x80, 32, bytearray(4), wrong, 100)
 
 
 def test_a_full_history_takes_no_more() -> None:
@@ -151,7 +165,7 @@ def test_a_full_history_takes_no_more() -> None:
     stream.flush(line.send, 0)
     assert line.numbers() == [0, 1, 2, 3]
     assert not fill(stream)
-    assert stream.acknowledge(1, 0, line.send, 1)
+    assert acknowledge(stream, 1, 0, line.send, 1)
     assert fill(stream)
     assert not fill(stream)
     stream.flush(line.send, 2)
@@ -167,7 +181,7 @@ def test_every_number_is_sent_once_and_acknowledged_across_the_wrap() -> None:
         stream.flush(line.send, now)
         sent += line.numbers()
         if now % 3 == 2:
-            assert stream.acknowledge((sent[-1] + 1) & 0xFFFF, 0, line.send, now)
+            assert acknowledge(stream, (sent[-1] + 1) & 0xFFFF, 0, line.send, now)
             assert stream.idle()
     assert sent == [(NEAR_WRAP + i) & 0xFFFF for i in range(80)]
     assert line.messages == []
@@ -181,7 +195,7 @@ def test_messages_are_what_was_written() -> None:
     stream.flush(line.send, 0)
     first = line.messages[:]
     line.messages = []
-    stream.acknowledge(65534, 0x000F, line.send, 50)
+    acknowledge(stream, 65534, 0x000F, line.send, 50)
     assert line.messages == first
     assert first[1] == b"\x81\x80\xff\xff\x07\x01\x08\x00" + b"\xff" * 8
     assert first[2] == b"\x81\x80\x00\x00\x07\x01\x08\x00" + b"\x00" * 8
@@ -197,9 +211,9 @@ def test_bitmap_bits_name_the_messages_to_send_again() -> None:
         line.numbers()
         for bit in range(16):
             now = 100 * (bit + 1)
-            assert stream.acknowledge(start, 1 << bit, line.send, now)
+            assert acknowledge(stream, start, 1 << bit, line.send, now)
             assert line.numbers() == [(start + bit) & 0xFFFF]
-        stream.acknowledge(start, 0x8101, line.send, 5000)
+        acknowledge(stream, start, 0x8101, line.send, 5000)
         assert line.numbers() == [(start + bit) & 0xFFFF for bit in (0, 8, 15)]
 
 
@@ -210,7 +224,7 @@ def test_bits_of_what_was_never_sent_are_passed_over() -> None:
     fill(stream)
     stream.flush(line.send, 0)
     line.numbers()
-    assert stream.acknowledge(0, 0xFFFF, line.send, 50)
+    assert acknowledge(stream, 0, 0xFFFF, line.send, 50)
     assert line.numbers() == [0, 1]
 
 
@@ -222,10 +236,10 @@ def test_acknowledgements_of_numbers_never_sent_change_nothing() -> None:
     stream.flush(line.send, 0)
     line.numbers()
     for wrong in (2, 100, 0x7FFF, 0x8000, 65534, 65000):
-        assert not stream.acknowledge(wrong, 0xFFFF, line.send, 50), wrong
+        assert not acknowledge(stream, wrong, 0xFFFF, line.send, 50), wrong
     assert stream.first == 65535
     assert line.numbers() == []
-    assert stream.acknowledge(1, 0, line.send, 60)
+    assert acknowledge(stream, 1, 0, line.send, 60)
     assert stream.idle()
 
 
@@ -235,9 +249,9 @@ def test_old_acknowledgements_change_nothing() -> None:
     for _ in range(4):
         fill(stream)
     stream.flush(line.send, 0)
-    stream.acknowledge(3, 0, line.send, 1)
+    acknowledge(stream, 3, 0, line.send, 1)
     line.numbers()
-    assert not stream.acknowledge(1, 0x0003, line.send, 100)
+    assert not acknowledge(stream, 1, 0x0003, line.send, 100)
     assert stream.first == 3
     assert line.numbers() == []
 
@@ -250,13 +264,13 @@ def test_repeated_nacks_are_held_off() -> None:
     stream.flush(line.send, 1000)
     line.numbers()
     for now in (1001, 1002, 1010):
-        stream.acknowledge(0, 0x0001, line.send, now)
+        acknowledge(stream, 0, 0x0001, line.send, now)
     assert line.numbers() == [0]
-    stream.acknowledge(0, 0x0005, line.send, 1011)
+    acknowledge(stream, 0, 0x0005, line.send, 1011)
     assert line.numbers() == [2]
-    stream.acknowledge(2, 0x0001, line.send, 1012)  # number 2 was sent again just now
+    acknowledge(stream, 2, 0x0001, line.send, 1012)  # number 2 was sent again just now
     assert line.numbers() == []
-    stream.acknowledge(2, 0x0001, line.send, 1040)
+    acknowledge(stream, 2, 0x0001, line.send, 1040)
     assert line.numbers() == [2]
     assert stream.resends == 3
 
@@ -271,7 +285,7 @@ def test_a_heartbeat_is_due_a_period_after_sending_and_after_each_acknowledgemen
     fill(stream)
     stream.flush(line.send, 10_050)
     assert stream.due == 10_100
-    stream.acknowledge(1, 0, line.send, 10_070)
+    acknowledge(stream, 1, 0, line.send, 10_070)
     assert stream.due == 10_170
 
 
@@ -287,7 +301,7 @@ def test_reset_begins_with_number_0() -> None:
     fill(stream)
     stream.flush(line.send, 0)
     assert line.numbers() == [0]
-    assert stream.acknowledge(0, 0x0001, line.send, 500)
+    assert acknowledge(stream, 0, 0x0001, line.send, 500)
     assert line.numbers() == [0]
 
 
@@ -297,7 +311,7 @@ def test_unacknowledged_shows_what_is_kept_in_order() -> None:
     for _ in range(3):
         fill(stream)
     stream.flush(line.send, 0)
-    stream.acknowledge(65535, 0, line.send, 0)
+    acknowledge(stream, 65535, 0, line.send, 0)
     line.numbers()
     stream.unacknowledged(line.send)
     assert line.numbers() == [65535, 0]
@@ -307,11 +321,11 @@ def test_sending_does_not_allocate() -> None:
     stream = output(history=4, mtu=16)
 
     def call() -> None:
-        at = stream.reserve(8)
-        buf = stream.buf
-        buf[at] = 7
+        at = stream.place(8)
+        stream.buf[at] = 7
+        stream.commit(at, 8)
         stream.flush(quiet, 5)
-        stream.acknowledge(stream.next, 0, quiet, 6)
+        stream.acknowledge(stream.next, quiet, 6)
 
     assert allocates(call) == 0
 
@@ -327,7 +341,7 @@ def test_in_order_across_the_wrap() -> None:
     stream = receiver(start=NEAR_WRAP)
     for i in range(80):
         assert take(stream, NEAR_WRAP + i) == [(NEAR_WRAP + i) & 0xFFFF]
-        assert stream.missing() == 0
+        assert missing(stream) == 0
     assert stream.expected == NEAR_WRAP + 80 - 65536
 
 
@@ -338,7 +352,7 @@ def test_any_order_within_the_window_is_handled_in_order() -> None:
         for i in (3, 1, 15, 2, 14, 4, 8, 0, 5, 13, 6, 7, 12, 9, 11, 10):
             handled += take(stream, start + i)
         assert handled == [(start + i) & 0xFFFF for i in range(16)]
-        assert stream.missing() == 0
+        assert missing(stream) == 0
         assert stream.early == {}
 
 
@@ -358,7 +372,7 @@ def test_outside_the_window_is_dropped() -> None:
     stream = receiver(window=16, start=65530)
     for number in (65530 + 16, 65529, 0x7000):
         assert take(stream, number) == []
-    assert stream.missing() == 0
+    assert missing(stream) == 0
     assert stream.early == {}
     take(stream, 65530 + 15)
     assert list(stream.early) == [(65530 + 15) & 0xFFFF]
@@ -367,50 +381,50 @@ def test_outside_the_window_is_dropped() -> None:
 def test_missing_names_every_hole() -> None:
     for start in (0, 65530):
         stream = receiver(start=start)
-        assert stream.missing() == 0
+        assert missing(stream) == 0
         take(stream, start + 2)
-        assert stream.missing() == 0x0003
+        assert missing(stream) == 0x0003
         take(stream, start + 9)
-        assert stream.missing() == 0x01FB
+        assert missing(stream) == 0x01FB
         take(stream, start + 15)
-        assert stream.missing() == 0x7DFB
+        assert missing(stream) == 0x7DFB
         assert take(stream, start) == [start]
-        assert stream.missing() == 0x3EFD
+        assert missing(stream) == 0x3EFD
         assert take(stream, start + 1) == [start + 1, (start + 2) & 0xFFFF]
-        assert stream.missing() == 0x0FBF
+        assert missing(stream) == 0x0FBF
 
 
 def test_heartbeat_announces() -> None:
     stream = receiver()
-    stream.announce(0, 2)
-    assert stream.missing() == 0x0007
-    stream.announce(0, 1)
-    assert stream.missing() == 0x0007
-    stream.announce(0, 15)
-    assert stream.missing() == 0xFFFF
+    announce(stream, 0, 2)
+    assert missing(stream) == 0x0007
+    announce(stream, 0, 1)
+    assert missing(stream) == 0x0007
+    announce(stream, 0, 15)
+    assert missing(stream) == 0xFFFF
     assert take(stream, 0) == [0]
-    assert stream.missing() == 0x7FFF
+    assert missing(stream) == 0x7FFF
 
 
 def test_announcements_far_ahead_are_asked_for_a_window_at_a_time() -> None:
     stream = receiver(start=65500)
-    stream.announce(65500, (65500 + 30_000) & 0xFFFF)
-    assert stream.missing() == 0xFFFF
+    announce(stream, 65500, (65500 + 30_000) & 0xFFFF)
+    assert missing(stream) == 0xFFFF
     assert take(stream, 65500) == [65500]
-    assert stream.missing() == 0xFFFF
+    assert missing(stream) == 0xFFFF
     for i in range(1, 200):
         assert take(stream, 65500 + i) == [(65500 + i) & 0xFFFF]
-    assert stream.missing() == 0xFFFF
+    assert missing(stream) == 0xFFFF
 
 
 def test_an_announcement_of_what_is_past_changes_nothing() -> None:
     stream = receiver(start=100)
-    stream.announce(90, 99)
+    announce(stream, 90, 99)
     assert stream.expected == 100
-    assert stream.missing() == 0
-    stream.announce(0x9000, 50)
+    assert missing(stream) == 0
+    announce(stream, 0x9000, 50)
     assert stream.expected == 100
-    assert stream.missing() == 0
+    assert missing(stream) == 0
 
 
 def test_heartbeat_gives_messages_up() -> None:
@@ -418,10 +432,10 @@ def test_heartbeat_gives_messages_up() -> None:
         stream = receiver(start=start)
         take(stream, start + 3)
         take(stream, start + 6)
-        stream.announce((start + 3) & 0xFFFF, (start + 7) & 0xFFFF)
+        announce(stream, (start + 3) & 0xFFFF, (start + 7) & 0xFFFF)
         assert stream.expected == (start + 3) & 0xFFFF
         assert kept(stream) == [(start + 3) & 0xFFFF]
-        assert stream.missing() == 0b1011  # 4, 5 and 7
+        assert missing(stream) == 0b1011  # 4, 5 and 7
         assert take(stream, start + 4) == [(start + 4) & 0xFFFF]
         assert take(stream, start + 5) == [(start + 5) & 0xFFFF, (start + 6) & 0xFFFF]
 
@@ -429,26 +443,26 @@ def test_heartbeat_gives_messages_up() -> None:
 def test_heartbeat_gives_everything_up() -> None:
     stream = receiver(start=65533)
     take(stream, 65535)
-    stream.announce(20, 19)
+    announce(stream, 20, 19)
     assert stream.expected == 20
     assert stream.early == {}
-    assert stream.missing() == 0
+    assert missing(stream) == 0
     assert take(stream, 20) == [20]
 
 
 def test_reset_of_a_receiver() -> None:
     stream = receiver(start=500)
     take(stream, 503)
-    stream.reset()
-    assert stream.missing() == 0
+    inputs.reset(stream)
+    assert missing(stream) == 0
     assert take(stream, 503) == []
     assert take(stream, 0) == [0]
 
 
 def test_a_message_longer_than_a_slot_stays_missing() -> None:
     stream = receiver()
-    assert not stream.accept(1, bytes(40), 0, 40)
-    assert stream.missing() == 0x0003
+    assert not accept(stream, 1, bytes(40), 0, 40)
+    assert missing(stream) == 0x0003
     assert take(stream, 0) == [0]
     assert take(stream, 1) == [1]
 

@@ -15,12 +15,14 @@ from typing import Any, NamedTuple
 from muros.client import Session, TimeSync, ping
 from muros.client._types import Deliver
 from muros.client.closing import leave
-from muros.client.entities import publish
 from muros.client.link import CONNECTED
 from muros.client.qos import Qos
 from muros.client.raw import Raw
+from muros.client.requests import requests, submit
+from muros.client.session import Entity
 from muros.xrce import create, create_text
 from muros.xrce._types import Buffer
+from muros.xrce.beginning import flush
 from muros.xrce.constants import (
     ACKNACK,
     CREATE,
@@ -159,9 +161,10 @@ class Held:
     def __init__(self, stream: Any) -> None:
         self.stream = stream
         self.reliable = stream.reliable
-        self.reserve = stream.reserve
-        self.capacity = stream.capacity
-        self.cancel = stream.cancel
+        self.place = stream.place
+        self.commit = stream.commit
+        self.mtu = stream.mtu
+        self._start = stream._start
 
     @property
     def buf(self) -> bytearray:
@@ -211,8 +214,10 @@ class Puppet:
         self.session.now = now
         self.session.deliver(message, 0, len(message))
         if not self.session.login:
-            self.session.work(now)
-            self.session.flush(now)
+            self.session.lead().turn(self.session, now)
+            if self.session.backlog is not None:
+                self.session.backlog.pump()
+            flush(self.session, now)
 
     def act(self, message: bytes, now: int) -> None:
         """Does what the recorded client did when it said ``message``."""
@@ -236,17 +241,17 @@ class Puppet:
                 self.write(message[1], object_id, body[4:])
             elif kind == GET_INFO:
                 session.request, request = 10, session.request
-                session._ask()
+                session.ask()
                 session.request = request
                 session._ping = 0
             elif kind == TIMESTAMP:
                 seconds, nanoseconds = (int.from_bytes(body[i : i + 4], "little") for i in (0, 4))
                 self.time.request(seconds * 1_000_000 + nanoseconds // 1000)
-        session.flush(now)
+        flush(session, now)
 
     def submit(self, kind: int, flags: int, object_id: int, payload: bytes) -> None:
         """A request."""
-        assert self.session.submit(kind, flags, self.session.requests(1), object_id, payload)
+        assert submit(self.session, kind, flags, requests(self.session, 1), object_id, payload)
 
     def write(self, stream_id: int, object_id: int, data: bytes) -> None:
         """A sample."""
@@ -254,14 +259,13 @@ class Puppet:
         writer = SimpleNamespace(
             session=session,
             stream=Held(session.output(stream_id & 0x80)),
-            index=object_id >> 4,
-            kind=object_id & 15,
+            id=object_id,
             todo=0,
             status=0,
             name="written",
         )
         assert session.state == CONNECTED
-        assert publish(writer, Raw(data))
+        assert Entity.publish(writer, Raw(data))  # type: ignore[arg-type]
 
 
 def whole(message: bytes, owner: Any) -> Iterator[Submessage]:

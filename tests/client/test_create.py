@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from muros.client import Qos
+from muros.client import Qos, Session
 from muros.client.hello import hello
 from muros.client.names import dds_type, resolve, topic_name
 from muros.client.qos import profile
@@ -19,6 +19,7 @@ from muros.xrce.representation import (
     encode_variant,
     parse_variant_untrusted,
 )
+from tests.client.replay import Wire
 
 VECTORS = Path(__file__).parent.parent / "vectors" / "rmw"
 BINARY: list[dict[str, Any]] = json.loads((VECTORS / "entities_bin.json").read_text())["cases"]
@@ -175,15 +176,20 @@ def test_profiles_of_ros() -> None:
         Qos(durability="for ever")
 
 
+def session(session_id: int, key: int, liveliness: int) -> Session:
+    """A session that asks for itself without naming the attempt."""
+    return Session(Wire(), key, session_id, properties=False, hard_liveliness=liveliness)
+
+
 def test_hello_with_hard_liveliness() -> None:
     recorded = json.loads((VECTORS / "hard_liveliness.json").read_text())
     theirs = bytearray.fromhex(recorded["create_client_datagram"])
     theirs[6] = len(theirs) - 8  # the reference says 16
     theirs[-3] = 0  # padding
-    assert hello(0x81, bytes.fromhex("cafebabe"), 508, None, 3000) == bytes(theirs)
+    assert hello(session(0x81, 0xCAFEBABE, 3000)) == bytes(theirs)
 
 
 def test_hello_with_key_in_the_header() -> None:
-    assert hello(1, b"\xaa\xbb\xcc\xdd", 508, None, 0).hex() == (
+    assert hello(session(1, 0xAABBCCDD, 0)).hex() == (
         "00000000aabbccdd00011000585243450100010faabbccdd0100fc01"
     )

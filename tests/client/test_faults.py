@@ -7,7 +7,9 @@ import pytest
 
 from muros.client import CONNECTED, CONNECTING, LOST, WAITING
 from muros.client import problems as problem
+from muros.client.creating import status
 from muros.client.raw import Raw
+from muros.client.requests import keep
 from tests.client.test_session import Device, kinds
 from tests.client.world import STRING, World
 
@@ -52,14 +54,14 @@ def test_an_answer_about_another_object_is_none() -> None:
     late = session.writer(device.participant, "rt/late", STRING)
     world.network.partition(["client"])
     session.spin_once(world.now)
-    session._on_status(late.request, late.object_id(1), 0x87)
-    session._on_status(late.request + late.steps, late.object_id(1), 0x87)
+    status(session, late.request, late.object_id(1), 0x87)
+    status(session, late.request + 3, late.object_id(1), 0x87)
     assert session.waiting == 3
-    assert late.todo == 7
+    assert late.todo == 0x77
     assert not device.problems
-    session._on_status(late.request, late.object_id(0), 0)
+    status(session, late.request, late.object_id(0), 0)
     assert session.waiting == 2
-    assert late.todo == 6
+    assert late.todo == 0x66
 
 
 @pytest.mark.parametrize("queue", [0, 4])
@@ -82,7 +84,7 @@ def test_replies_have_the_numbers_of_their_requests_when_ids_wrap(queue: int) ->
     client.request = LAST_REQUEST - 2
     for _ in range(6):
         if queue:
-            client.keep()  # they go through the backlog
+            keep(client)  # they go through the backlog
         sent.append(requester.send(Raw(b"q")))
         world.run(50)
     assert replies == sent == [LAST_REQUEST - 2, LAST_REQUEST - 1, LAST_REQUEST, 10, 11, 12]
@@ -94,7 +96,7 @@ def test_what_is_written_to_a_refused_writer_is_refused_and_counted() -> None:
     world.start_agent(max_objects=3)
     device = Device(world).connect()
     assert device.writer.status >= 0x80
-    assert device.writer.todo == 0
+    assert device.writer.todo == 0x100
     assert not device.writer.write_bytes(b"to nobody")
     assert device.session.drops[0] == 1
     assert [code for code, _ in device.problems][-1] == problem.OFFLINE
@@ -131,7 +133,7 @@ def run(world: World, ms: int) -> int:
 def test_a_reader_that_raises_has_had_its_sample() -> None:
     world = World()
     device = Device(world).connect()
-    device.reader.on_data = once(lambda buf, off, n: device.got.append(bytes(buf[off : off + n])))
+    device.reader.deliver = once(lambda buf, off, n: device.got.append(bytes(buf[off : off + n])))
     for i in range(5):
         device.host_writer.write(b"%d" % i)
     assert run(world, 500) == 1

@@ -125,15 +125,15 @@ def test_the_indices_of_deleted_objects_are_used_again_once_they_are_deleted() -
     assert session.backlog is None
     assert unused(session) == 2, "its DELETE is not acknowledged"
     world.run(50)
-    assert unused(session) == held.index
+    assert unused(session) == held.id >> 4
     for _ in range(5):
         again = session.writer(device.participant, "rt/again", STRING)
-        assert (again.index, again.topic_index) == (held.index, held.topic_index)
+        assert (again.id, again.topic) == (held.id, held.topic)
         world.run(50)
         assert again.write_bytes(b"here")
         again.destroy()
         fresh = session.writer(device.participant, "rt/fresh", STRING)
-        assert fresh.index != again.index
+        assert fresh.id != again.id
         world.run(50)
         assert fresh.write_bytes(b"here too")
         fresh.destroy()
@@ -145,7 +145,7 @@ def test_the_indices_of_deleted_objects_are_used_again_once_they_are_deleted() -
 def test_there_is_an_end_to_the_objects_of_a_kind() -> None:
     session = Session(Wire(), 1)
     nodes = [session.participant("n") for _ in range(4096)]
-    assert {node.index for node in nodes} == set(range(4096))
+    assert {node.id >> 4 for node in nodes} == set(range(4096))
     with pytest.raises(ValueError, match="a session has at most 4096 objects of a kind"):
         session.participant("one more")
     assert len(session.entities) == 4096

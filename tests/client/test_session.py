@@ -9,9 +9,9 @@ import pytest
 
 from muros.client import CONNECTED, CONNECTING, LOST, WAITING, Session
 from muros.client import problems as problem
-from muros.client.entities import Participant, Writer
 from muros.client.raw import Raw
-from muros.client.reader import Reader
+from muros.client.requests import requests
+from muros.client.session import Entity
 from muros.links.testing import Datagram
 from tests.client.replay import Wire
 from tests.client.world import STRING, SimulatedTransport, World
@@ -30,9 +30,9 @@ class Device:
         self.got: list[bytes] = []
         self.session.on_state = self.states.append
         self.session.on_problem = lambda code, text: self.problems.append((code, text))
-        self.participant: Participant = self.session.participant("/ns/node")
-        self.writer: Writer = self.session.writer(self.participant, "rt/out", STRING, qos)
-        self.reader: Reader = self.session.reader(
+        self.participant: Entity = self.session.participant("/ns/node")
+        self.writer: Entity = self.session.writer(self.participant, "rt/out", STRING, qos)
+        self.reader: Entity = self.session.reader(
             self.participant,
             "rt/in",
             STRING,
@@ -172,9 +172,7 @@ def test_a_lost_status_is_asked_for_again() -> None:
     def tap(datagram: Datagram) -> bool:
         if datagram.sender == "agent" and len(datagram.data) > 4 and datagram.data[4] == STATUS and not lost:
             lost.append(1)
-            world.core.clients[b"\xaa\xbb\xcc\xdd"].outputs[0x80].acknowledge(
-                1, 0, lambda *_: None, world.now
-            )
+            world.core.clients[b"\xaa\xbb\xcc\xdd"].outputs[0x80].acknowledge(1, lambda *_: None, world.now)
             return False  # gone for good, as the reference agent loses one when its window is full
         return True
 
@@ -561,15 +559,15 @@ def test_arguments_are_checked() -> None:
 
 
 def test_keys_are_drawn_and_differ() -> None:
-    assert len({Session(Wire()).key for _ in range(20)}) == 20
+    assert len({Session(Wire()).notes["key"] for _ in range(20)}) == 20
 
 
 def test_request_ids_wrap_to_ten() -> None:
     session = Session(Wire(), 1)
     session.request = 0xFFFE
-    assert [session.requests(1) for _ in range(3)] == [0xFFFE, 10, 11]
+    assert [requests(session, 1) for _ in range(3)] == [0xFFFE, 10, 11]
     session.request = 0xFFFD
-    assert session.requests(4) == 10
+    assert requests(session, 4) == 10
 
 
 def test_foreign_bytes_only_move_counters() -> None:

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from muros.client import CONNECTED, Session, TimeSync
+from muros.xrce.constants import TIMESTAMP_REPLY
 from tests.client.replay import Wire
 from tests.client.world import WALL, World
 
@@ -24,7 +25,7 @@ def exchange(sync: TimeSync, at: int, there: int, held: int, back: int, offset: 
     stamp = wire.sent[-1][8:16]
     came, left = at + there + offset, at + there + held + offset
     message = reply(stamp, came * 1000, left * 1000)
-    sync._on_reply(message, 8, at + there + held + back)
+    sync._on_reply(message, 8, 24, at + there + held + back)
     return at + there + held + back
 
 
@@ -74,12 +75,12 @@ def test_the_bound_grows_with_time() -> None:
 def test_answers_to_nothing_are_passed_over() -> None:
     sync = fresh()
     assert (sync.time(5), sync.error(5), sync.synchronized()) == ((0, 0), -1, False)
-    sync._on_reply(reply(bytes(8), WALL, WALL), 8, 100)
+    sync._on_reply(reply(bytes(8), WALL, WALL), 8, 24, 100)
     assert not sync.synchronized()
     end = exchange(sync, 1_000, 100, 0, 100, WALL // 1000)
     wire = sync.session.transport
     assert isinstance(wire, Wire)
-    sync._on_reply(reply(wire.sent[-1][8:16], 5, 5), 8, end + 10)  # doubled by the network
+    sync._on_reply(reply(wire.sent[-1][8:16], 5, 5), 8, 24, end + 10)  # doubled by the network
     assert sync.time(end)[0] == (WALL // 1000 + end) // 10**6
 
 
@@ -89,7 +90,7 @@ def test_nonsense_does_no_harm(body: bytes, now: int) -> None:
     sync.request(now)
     wire = sync.session.transport
     assert isinstance(wire, Wire)
-    sync._on_reply(body[:16] + wire.sent[-1][8:16], 0, now + 1000)
+    sync._on_reply(body[:16] + wire.sent[-1][8:16], 0, 24, now + 1000)
     seconds, nanoseconds = sync.time(now + 2000)
     assert 0 <= nanoseconds < 10**9
     assert seconds >= 0
@@ -101,15 +102,13 @@ def test_against_the_agent() -> None:
     world.until(lambda: session.state == CONNECTED)
     sync = TimeSync(session)
     replies = 0
-    original = session.on_time
-    assert original is not None
 
-    def on_time(buf: bytes, off: int) -> None:
+    def on_time(buf: bytes, off: int, n: int) -> None:
         nonlocal replies
         replies += 1
-        sync._on_reply(buf, off, world.now * 1000)
+        sync._on_reply(buf, off, n, world.now * 1000)
 
-    session.on_time = on_time  # type: ignore[assignment]
+    session.objects[-TIMESTAMP_REPLY] = on_time
     for _ in range(8):
         sync.request(world.now * 1000)
         world.run(100, 1)

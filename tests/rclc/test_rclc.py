@@ -8,6 +8,7 @@ import pytest
 
 from muros.client import CONNECTED, Qos
 from muros.client._types import Transport
+from muros.client.creating import variant
 from muros.rclc import CapacityError, Context, Executor, GuardCondition, InvalidNameError, Node, register
 from muros.rclc.timer import Timer
 from tests.client.world import World
@@ -75,8 +76,9 @@ def test_names_on_the_wire_are_those_of_ros() -> None:
     node = board.context.node("thermometer", namespace="greenhouse")
     writer: Any = node.publisher(Int32, "temperature")
     assert (writer.name, writer.type_name) == ("rt/greenhouse/temperature", "std_msgs/msg/Int32")
-    assert writer.node.name == "/greenhouse/thermometer"
-    assert b"std_msgs::msg::dds_::Int32_\0" in writer.variant(0)
+    assert writer.parent == node.participant.id
+    assert node.participant.name == "/greenhouse/thermometer"
+    assert b"std_msgs::msg::dds_::Int32_\0" in variant(writer, 0)
     absolute: Any = node.publisher(Int32, "/temperature", qos="sensor_data")
     assert absolute.name == "rt/temperature"
     private: Any = node.publisher(Int32, "~/temperature", qos=Qos(depth=1))
@@ -394,8 +396,7 @@ def test_names_of_the_package_are_there() -> None:
     import muros.rclc
 
     for package in (muros.rclc, muros.client):
-        for name in package._MODULES.split()[::2]:
-            if name != "Uart":
-                assert getattr(package, name) is not None
+        for name in package.__all__:
+            assert getattr(package, name) is not None
         with pytest.raises(AttributeError):
             package.Nothing  # noqa: B018

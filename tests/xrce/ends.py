@@ -5,10 +5,9 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
+from muros.xrce import beginning, inputs, outputs
 from muros.xrce._types import Buffer
 from muros.xrce.constants import HANDLED, LATER
-from muros.xrce.inputs import Input
-from muros.xrce.outputs import Output
 from muros.xrce.queues import QueuedReliableOutput, resume
 from muros.xrce.session import SessionCore
 
@@ -30,25 +29,29 @@ class End(SessionCore):
         start: int = 0,
         largest: int = 1 << 20,
     ) -> None:
-        super().__init__(1 if keyed else 0x81, KEY, self._keep, self._take, largest)
+        beginning.begin(self, 1 if keyed else 0x81, KEY, self._keep, self._take, largest)
         self.hosts = hosts
         self.mtu = mtu
         self.out: list[bytes] = []
         self.got: list[bytes] = []
         self.is_busy: Callable[[], bool] = lambda: False
         self.stop_at_failure = False
-        output: Any = (QueuedReliableOutput if hosts else Output)(RELIABLE, mtu, self.head, window, 100)
+        output: Any = (QueuedReliableOutput if hosts else outputs.make)(RELIABLE, mtu, self.head, window, 100)
         output.next = output.first = output.sent = start
         self.outputs[RELIABLE] = output
         self._window = window
         self._begin = start
         self.make_input(RELIABLE)
 
+    reset = beginning.reset
+    stranger = beginning.stranger
+    heartbeats = flush = beginning.flush
+
     def make_input(self, stream_id: int) -> Any:
         """Every stream comes into being."""
-        stream = Input(stream_id)
+        stream = inputs.make(stream_id)
         if stream_id >= RELIABLE:
-            stream = Input(stream_id, self.mtu, self._window)
+            stream = inputs.make(stream_id, self.mtu, self._window)
             stream.expected = self._begin
         self.inputs[stream_id] = stream
         return stream

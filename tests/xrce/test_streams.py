@@ -6,10 +6,11 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from muros.xrce._types import Buffer
-from muros.xrce.inputs import Input
-from muros.xrce.outputs import Output
+from muros.xrce import inputs, outputs
+from muros.xrce._types import Buffer, Send
+from muros.xrce.mending import accept, advance, announce, missing, resend
 from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableOutput
+from muros.xrce.streams import Input, Output
 
 HEAD = b"\x81\0\0\0"
 starts = st.sampled_from([0, 65500, 65530, 65535])
@@ -73,11 +74,19 @@ class Model:
         return sum(1 << n - self.expected for n in wanted if n not in self.early)
 
 
+def acknowledge(stream: Output, first: int, bitmap: int, send: Send, now: int) -> bool:
+    """What a session does with an ACKNACK."""
+    known = stream.acknowledge(first, send, now)
+    if known and bitmap:
+        resend(stream, bitmap, send, now)
+    return known
+
+
 def feed(stream: Input, number: int, content: bytes) -> list[bytes]:
     """A message arrives; what is handled because of it."""
-    if not stream.accept(number & 0xFFFF, content, 0, len(content)):
+    if not accept(stream, number & 0xFFFF, content, 0, len(content)):
         return []
-    stream.advance(1)
+    advance(stream, 1)
     return [content, *kept(stream)]
 
 
@@ -86,7 +95,7 @@ def kept(stream: Input) -> list[bytes]:
     handled = []
     while stream.expected in stream.early:
         handled.append(stream.early[stream.expected])
-        stream.advance(1)
+        advance(stream, 1)
     return handled
 
 
@@ -101,22 +110,22 @@ steps = st.lists(
 
 @given(starts, windows, steps)
 def test_a_receiver_does_what_the_book_says(start: int, window: int, told: list[Any]) -> None:
-    stream, model = Input(0x80, 8, window), Model(start, window)
+    stream, model = inputs.make(0x80, 8, window), Model(start, window)
     stream.expected = start
     for what, first, second in told:
         if what == "message":
             handled = model.take(model.expected + first, second)
             assert feed(stream, stream.expected + first, second) == handled
         elif what == "reset":
-            stream.reset()
+            inputs.reset(stream)
             model = Model(0, window)
         else:
             at = stream.expected
             handled = model.announce(model.expected + first, model.expected + first + second)
-            stream.announce(at + first & 0xFFFF, at + first + second & 0xFFFF)
+            announce(stream, at + first & 0xFFFF, at + first + second & 0xFFFF)
             assert kept(stream) == handled
         assert stream.expected == model.expected & 0xFFFF
-        assert stream.missing() == model.missing()
+        assert missing(stream) == model.missing()
         assert set(stream.early) == {n & 0xFFFF for n in model.early}
 
 
@@ -126,7 +135,7 @@ acknowledgements = st.tuples(st.integers(-3, 20), st.integers(0, 0xFFFF), st.int
 @given(starts, windows, st.lists(st.binary(max_size=12) | acknowledgements, max_size=60))
 def test_senders_of_boards_and_hosts_are_alike(start: int, window: int, told: list[Any]) -> None:
     lines = [Line(), Line()]
-    board = Output(0x80, 20, bytearray(HEAD), window, 100)
+    board = outputs.make(0x80, 20, bytearray(HEAD), window, 100)
     host = QueuedReliableOutput(0x80, 20, bytearray(HEAD), window, 100)
     now = 1000
     for stream in (board, host):
@@ -145,8 +154,8 @@ def test_senders_of_boards_and_hosts_are_alike(start: int, window: int, told: li
             ahead, bitmap, wait = one
             now += wait
             first = board.first + ahead & 0xFFFF
-            taken = [board.acknowledge(first, bitmap, lines[0].send, now)]
-            taken.append(host.acknowledge(first, bitmap, lines[1].send, now))
+            taken = [acknowledge(board, first, bitmap, lines[0].send, now)]
+            taken.append(acknowledge(host, first, bitmap, lines[1].send, now))
             assert taken[0] == taken[1]
         assert lines[0].sent == lines[1].sent
         assert (board.first, board.next, board.sent, board.resends) == (
@@ -178,7 +187,7 @@ def test_what_waits_behind_the_window_goes_in_order(
         in_flight = stream.next - stream.first & 0xFFFF
         assert in_flight <= window
         assert in_flight + stream.waiting() <= len(bodies)
-        stream.acknowledge(stream.first + min(count, in_flight) & 0xFFFF, 0, line.send, 0)
+        acknowledge(stream, stream.first + min(count, in_flight) & 0xFFFF, 0, line.send, 0)
     assert [message[8:] for message in line.sent] == bodies
     assert [message[2] | message[3] << 8 for message in line.sent] == [
         start + n & 0xFFFF for n in range(len(bodies))
@@ -199,14 +208,14 @@ def test_a_queue_that_is_reset_forgets_what_waits() -> None:
     assert stream.free() == 2
     line.sent.clear()
     stream.post(submessage(b"new"), line.send, 0)
-    stream.acknowledge(1, 0, line.send, 0)
+    acknowledge(stream, 1, 0, line.send, 0)
     assert line.sent == [b"\x81\x80\0\0" + submessage(b"new")]
 
 
 @given(st.lists(st.binary(max_size=20), max_size=20), st.sampled_from([0, 65530]))
 def test_best_effort_of_boards_and_hosts_are_alike(bodies: list[bytes], start: int) -> None:
     lines = [Line(), Line()]
-    board = Output(1, 20, bytearray(HEAD))
+    board = outputs.make(1, 20, bytearray(HEAD))
     host = QueuedBestEffortOutput(1, 20, bytearray(HEAD))
     for stream in (board, host):
         stream.next = stream.first = stream.sent = start
@@ -225,10 +234,10 @@ def test_an_early_message_that_the_heap_has_no_room_for_is_asked_for_again() -> 
         def __setitem__(self, number: int, message: bytes) -> None:
             raise MemoryError
 
-    stream = Input(0x80, 64, 4)
+    stream = inputs.make(0x80, 64, 4)
     stream.early = Full()
-    assert not stream.accept(1, b"early", 0, 5)
-    assert stream.missing() == 0b11
+    assert not accept(stream, 1, b"early", 0, 5)
+    assert missing(stream) == 0b11
     stream.early = {}
-    assert not stream.accept(1, b"early", 0, 5)
-    assert stream.missing() == 0b01
+    assert not accept(stream, 1, b"early", 0, 5)
+    assert missing(stream) == 0b01

@@ -20,6 +20,7 @@ from muros.agent._proxies import (
     _Readable,
 )
 from muros.agent.events import EntityCreated, EntityDeleted, client_name
+from muros.xrce import beginning, inputs
 from muros.xrce._types import Buffer
 from muros.xrce.constants import (
     CREATE,
@@ -48,13 +49,13 @@ from muros.xrce.constants import (
     WRITE_DATA,
 )
 from muros.xrce.fragments import Joiner
-from muros.xrce.inputs import Input
 from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableOutput, resume
 from muros.xrce.representation import InvalidRepresentation, Kind, parse_variant_untrusted
 from muros.xrce.session import SessionCore
 
 if TYPE_CHECKING:
     from muros.agent._core import AgentCore, Port
+    from muros.xrce.streams import Input
 
 __all__ = ["AgentSession"]
 
@@ -65,8 +66,12 @@ _IDENTITY = 24
 class AgentSession(SessionCore):
     """A client's session. ``key`` is the client key as bytes, ``mtu`` the longest message the client takes."""
 
+    reset = beginning.reset
+    stranger = beginning.stranger
+    heartbeats = flush = beginning.flush
+
     def __init__(self, core: "AgentCore", port: "Port", address: Any, key: bytes, session_id: int) -> None:
-        super().__init__(session_id, key, self._send_lent, self._submessage, core.limits.max_sample)
+        beginning.begin(self, session_id, key, self._send_lent, self._submessage, core.limits.max_sample)
         self.core = core
         self.port = port
         self.address = address
@@ -212,7 +217,7 @@ class AgentSession(SessionCore):
 
     # Streams
 
-    def make_input(self, stream_id: int) -> Input | None:
+    def make_input(self, stream_id: int) -> "Input | None":
         """Any stream a client uses comes into being, up to a limit."""
         if len(self.inputs) >= self.core.limits.max_streams:
             self.core.report(
@@ -223,7 +228,7 @@ class AgentSession(SessionCore):
                 remedy="Use fewer streams, or raise max_streams.",
             )
             return None
-        stream = self.inputs[stream_id] = Input(stream_id, 0xFFFF, self.core.limits.window)
+        stream = self.inputs[stream_id] = inputs.make(stream_id, 0xFFFF, self.core.limits.window)
         return stream
 
     def _on_fragment(self, stream: Any, buf: Buffer, at: int, n: int, last: int) -> int:
@@ -264,8 +269,8 @@ class AgentSession(SessionCore):
             remedy="Raise max_sample, or write smaller samples.",
         )
 
-    def _on_acknack(self, buf: Buffer, at: int, flags: int) -> None:
-        super()._on_acknack(buf, at, flags)
+    def _on_acknack(self, buf: Buffer, at: int) -> None:
+        super()._on_acknack(buf, at)
         if self._waiting:
             waiting, self._waiting = self._waiting, []
             for reading in waiting:

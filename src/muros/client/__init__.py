@@ -4,7 +4,7 @@ Names are imported when they are first used, so that a board loads only what its
 that checks more and says more.
 """
 
-from muros.compat import MPY, const
+from muros.compat import MPY, borrow, const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -23,19 +23,23 @@ if TYPE_CHECKING:
     from muros.client.uart import Uart as Uart
     from muros.client.udp import Udp as Udp
 
-_MODULES = (
-    "Custom custom discover discovery CONNECTED link CONNECTING link LOST link WAITING link ping presence Qos qos "
-    "Serial serial Session session Tcp tcp TimeSync timesync Uart uart Udp udp"
-)
 if not MPY:
-    _MODULES = _MODULES.replace("session", "hosts")
-    __all__ = [name for name in _MODULES.split()[::2] if name != "Uart"]
+    __all__ = [
+        "CONNECTED",
+        "CONNECTING",
+        "LOST",
+        "WAITING",
+        "Custom",
+        "Qos",
+        "Serial",
+        "Session",
+        "Tcp",
+        "TimeSync",
+        "Udp",
+        "discover",
+        "ping",
+    ]
 
 
 def __getattr__(name: str) -> object:
-    words = _MODULES.split()
-    for i in range(0, len(words), 2):
-        if words[i] == name:
-            module = __import__("muros.client." + words[i + 1], None, None, (name,))
-            return getattr(module, name)
-    raise AttributeError(name)
+    return borrow("muros.exports").find("client", name)

@@ -3,10 +3,11 @@
 Items are whole submessages in the order in which they leave. The first of them that does not fit a message is cut
 into fragments as acknowledgements make room; its bytes are kept until the last fragment is acknowledged, so that it
 can be sent again whole. When a session begins anew, ``hold`` takes over every WRITE_DATA that the agent has not
-acknowledged (DDS-XRCE 1.0, 8.4.10 to 8.4.14).
+acknowledged (DDS-XRCE 1.0, 8.4.10 to 8.4.14). Boards borrow this for as long as there is a backlog.
 """
 
 from muros.client.link import CONNECTED
+from muros.client.requests import requests
 from muros.compat import const
 from muros.xrce.create import head
 from muros.xrce.fragments import Cutter
@@ -50,12 +51,13 @@ class Backlog:
         ready = session.state == CONNECTED and writer.todo == 0
         if writer.status or (not ready and not (stream.reliable and session.queue)):
             return self._refuse(_OFFLINE, _PROBLEM_OFFLINE, writer, n)
-        large = n + _HEAD > stream.capacity()
+        large = n + _HEAD > stream.mtu - stream._start - _HEAD
         waiting = len(self.items)
         if ready and not large and not (stream.reliable and (waiting or self._cut)):
-            at = stream.reserve(n + _HEAD)
+            at = stream.place(n + _HEAD)
             if at >= 0:
                 self._write(stream.buf, at, writer, message, n)
+                stream.commit(at, n + _HEAD)
                 stream.flush(session.send, session.now)
                 return True
         if not stream.reliable:
@@ -84,7 +86,7 @@ class Backlog:
         stream = session.reliable
         items = self.items
         if self._cut is not None and self.cutter is None:
-            if not stream.idle():
+            if stream.first != stream.next:
                 return
             self._cut = None
         while items:
@@ -93,14 +95,15 @@ class Backlog:
                 if data[0] == _WRITE_DATA and (session.state != CONNECTED or session.pending):
                     break
                 n = len(data) - _HEAD
-                if n > stream.capacity():
+                if n > stream.mtu - stream._start - _HEAD:
                     self._cut = data
                     self.cutter = Cutter(data)
                 else:
-                    at = stream.reserve(n)
+                    at = stream.place(n)
                     if at < 0:
                         break
                     stream.buf[at : at + len(data)] = data
+                    stream.commit(at, n)
                     items.pop(0)
                     continue
             if not self.cutter.pump(stream):
@@ -116,7 +119,8 @@ class Backlog:
         """Takes over what the agent has not acknowledged, before the streams begin again."""
         held: "list[bytes | bytearray]" = []
         self._held = held
-        self.session.reliable.unacknowledged(self._take)
+        stream = self.session.reliable
+        stream.transmit(stream.first, stream.next, self._take)
         if self.cutter is not None:
             self.items.pop(0)  # its first fragments are under way
             self._take_cut()
@@ -144,14 +148,8 @@ class Backlog:
         self._cut = None
 
     def _write(self, buf: bytearray, at: int, writer: "Any", message: "Outgoing", n: int) -> None:
-        request = self.session.requests(1)
-        head(buf, at, _WRITE_DATA, _LITTLE_ENDIAN, n + _HEAD, request, writer.index << 4 | writer.kind)
-        try:
-            message.write(buf, at + 2 * _HEAD)
-        except Exception:
-            if buf is writer.stream.buf:
-                writer.stream.cancel(at)
-            raise
+        head(buf, at, _WRITE_DATA, _LITTLE_ENDIAN, n + _HEAD, requests(self.session, 1), writer.id)
+        message.write(buf, at + 2 * _HEAD)
 
     def _refuse(self, cause: int, code: int, writer: "Any", n: int) -> bool:
         dropped(self.session, cause, code, n, writer)

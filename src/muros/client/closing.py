@@ -1,6 +1,8 @@
-"""The ends: entities are destroyed, sessions take leave of their agent."""
+"""The ends: entities are destroyed, sessions take leave of their agent. Boards borrow this."""
 
-from muros.client.link import WAITING
+from muros.client.entities import object_id, steps
+from muros.client.link import WAITING, enter
+from muros.client.requests import keep, requests
 from muros.compat import const
 from muros.xrce.create import head
 
@@ -8,14 +10,17 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
 
-    from muros.client.entities import Entity
-    from muros.client.session import Session
+    from muros.client.session import Entity, Session
     from muros.xrce._types import Buffer
 
 _DELETE = const(3)
 _LITTLE_ENDIAN = const(0x01)
 _OBJECT_CLIENT = const(0xFFFE)
 _REQUEST_LOGOUT = const(2)
+_CONTROL = const(8)
+_STEPS = const(0x0F)
+_ASKED = const(4)
+_REFUSED = const(0x100)
 _ATTEMPTS = const(10)
 _PATIENCE = const(100)  # ms for each attempt
 
@@ -26,29 +31,26 @@ def destroy(entity: "Entity") -> None:
     if entity not in session.entities:
         return
     session.entities.remove(entity)
-    if entity.todo:
+    count = steps(entity)
+    if entity.todo & _STEPS:
         session.pending -= 1
-    for step in range(entity.steps):
-        if entity.asked >> step & 1:
+    for step in range(count):
+        if entity.todo >> step + _ASKED & 1:
             session.waiting -= 1
-    entity.todo = entity.status = 1
-    session.objects.pop(entity.object_id(entity.steps - 1), None)
-    backlog = session.keep()
-    for step in (0, 2, 1) if entity.steps == 3 else (0,):
+    entity.todo = _REFUSED
+    entity.status = 1
+    session.objects.pop(entity.id, None)
+    backlog = keep(session)
+    for step in (0, 2, 1) if count == 3 else (0,):
         data = bytearray(8)
-        head(data, 0, _DELETE, _LITTLE_ENDIAN, 4, session.requests(1), entity.object_id(step))
+        head(data, 0, _DELETE, _LITTLE_ENDIAN, 4, requests(session, 1), object_id(entity, step))
         backlog.items.append(data)
 
 
 def leave(session: "Session") -> None:
     """Asks the agent once to delete the session."""
-    at = session.control(_DELETE, 4)
-    out = session.control_buffer()
-    out[at] = 0
-    out[at + 1] = _REQUEST_LOGOUT
-    out[at + 2] = _OBJECT_CLIENT >> 8
-    out[at + 3] = _OBJECT_CLIENT & 255
-    session.send_control()
+    head(session._control, _CONTROL, _DELETE, _LITTLE_ENDIAN, 4, _REQUEST_LOGOUT, _OBJECT_CLIENT)
+    session.send(session._control, _CONTROL - len(session.head), len(session.head) + 8)
 
 
 def close(session: "Session") -> None:
@@ -69,7 +71,8 @@ def close(session: "Session") -> None:
     session.send = closed.send
     session.up = False
     session.login = True
-    session.enter(WAITING)
+    session.lead()
+    enter(session, WAITING)
 
 
 class Closed:

@@ -18,34 +18,27 @@ def ask(session: "Session", timeout: int, clock: "Callable[[], int]") -> bool:
 
     A session that is not connected yet may become so and be asked then.
     """
-    ear = _Ear(session)
-    session.on_other = ear.hear  # type: ignore[method-assign]
+    answered: "list[bool]" = []
+
+    def hear(buf: "Buffer", off: int, n: int) -> None:
+        if n >= 6 and buf[off] == 0 and buf[off + 1] == _REQUEST:
+            answered.append(buf[off + 5] > 0)
+
+    session.objects[-_INFO] = hear
     try:
         asked = False
         start = clock()
         left = timeout
-        while left > 0 and not ear.answered:
+        while left > 0 and True not in answered:
             session.spin_once(clock())
             if not asked and session.up and not session.login:
-                session.ask(_REQUEST)
+                watching, session._ping = session._ping, _REQUEST
+                session.ask()
+                session._ping = watching
                 asked = True
-            if not ear.answered:
+            if True not in answered:
                 session.wait(min(left, session.deadline(clock())))
             left = timeout - ticks_diff(clock(), start)
     finally:
-        del session.on_other
-    return ear.answered
-
-
-class _Ear:
-    """Hears what comes for a session, and whether the answer is among it."""
-
-    def __init__(self, session: "Session") -> None:
-        self.answered = False
-        self._other = session.on_other
-
-    def hear(self, kind: int, buf: "Buffer", off: int, n: int) -> None:
-        """Takes a submessage on behalf of the session."""
-        if kind == _INFO and n >= 6 and buf[off] == 0 and buf[off + 1] == _REQUEST:
-            self.answered = buf[off + 5] > 0
-        self._other(kind, buf, off, n)
+        del session.objects[-_INFO]
+    return True in answered

@@ -1,24 +1,35 @@
-"""The message with which a client asks for a session: CREATE_CLIENT (DDS-XRCE 1.0, 7.8.2.1 and 8.3.5.1)."""
+"""The message with which a client asks for a session: CREATE_CLIENT (DDS-XRCE 1.0, 7.8.2.1 and 8.3.5.1).
+
+Boards borrow this.
+"""
 
 from struct import pack
 
+from muros.client.chance import draw
 from muros.compat import const
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from muros.client.session import Session
 
 _SESSION_NONE = const(0x80)
 
 
-def hello(session_id: int, key: bytes, mtu: int, attempt: "bytes | None", hard_liveliness: int) -> bytes:
-    """The whole message.
+def hello(session: "Session") -> bytes:
+    """The whole message, which names the attempt until the agent has accepted us.
 
-    ``attempt`` becomes the property ``muros_id``, by which an agent tells a repetition from a new beginning.
-    ``hard_liveliness`` in ms, up to 999999, becomes the property ``uxr_hl``.
+    With ``properties`` the attempt becomes the property ``muros_id``, by which an agent tells a repetition from a new
+    beginning. ``hard_liveliness`` in ms, up to 999999, becomes the property ``uxr_hl``.
     """
-    body = b"XRCE\1\0\1\x0f" + key + bytes((session_id,))
+    if not session.notes["attempt"]:
+        session.notes["attempt"] = draw(4)
     properties = []
-    if hard_liveliness:
-        properties.append(("uxr_hl", "%06d" % hard_liveliness))
-    if attempt:
-        properties.append(("muros_id", "%02x%02x%02x%02x" % (attempt[0], attempt[1], attempt[2], attempt[3])))
+    if session.notes["hard_liveliness"]:
+        properties.append(("uxr_hl", "%06d" % session.notes["hard_liveliness"]))
+    if session.notes["properties"]:
+        properties.append(("muros_id", "%02x%02x%02x%02x" % tuple(session.notes["attempt"])))
+    key: bytes = session.notes["key"]
+    body = b"XRCE\1\0\1\x0f" + key + session.head[:1]
     if properties:
         body += b"\1\0\0" + pack("<I", len(properties))
         for pair in properties:
@@ -27,6 +38,6 @@ def hello(session_id: int, key: bytes, mtu: int, attempt: "bytes | None", hard_l
         body += bytes(len(body) & 1)
     else:
         body += b"\0"
-    body += pack("<H", mtu)
-    head = b"\x80\0\0\0" if session_id >= _SESSION_NONE else b"\0\0\0\0" + key
+    body += pack("<H", session.mtu)
+    head = b"\x80\0\0\0" if session.head[0] >= _SESSION_NONE else b"\0\0\0\0" + key
     return head + pack("<BBH", 0, 1, len(body)) + body

@@ -10,8 +10,9 @@ import os
 import weakref
 from typing import TYPE_CHECKING, Any
 
-from muros.client import reasons
+from muros.client import methods, reasons
 from muros.client import session as board
+from muros.client.entities import steps
 from muros.client.link import CONNECTED
 from muros.client.problems import SESSION
 
@@ -56,6 +57,14 @@ class Session(board.Session):
     session was connected meanwhile. A session that is connected when the program ends is closed.
     """
 
+    participant = methods.participant
+    writer = methods.writer
+    reader = methods.reader
+    requester = methods.requester
+    replier = methods.replier
+    ping = methods.ping
+    close = methods.close
+
     def __init__(
         self,
         transport: Transport,
@@ -88,15 +97,12 @@ class Session(board.Session):
     def index(self, kind: int) -> int:
         """A new index for an object of a kind; when each was used, that of a deleted one. ValueError for none."""
         unused = _unused(self, kind) if self.counts[kind] == _INDICES else None
-        return unused[0] if unused else super().index(kind)
+        return unused[0] if unused else methods.index(self, kind)
 
-    def _is_due(self, now: int, again: int) -> bool:
-        if (self._due is None or now >= self._due) and self.state != CONNECTED and self.transport.mtu:
-            self._attempt_again(now)  # the transport of a closed session has no MTU
-        return super()._is_due(now, again)
-
-    def _attempt_again(self, now: int) -> None:
+    def attempting(self, now: int) -> None:
         """Tells how long nobody has answered."""
+        if self.state == CONNECTED or not self.transport.mtu:
+            return  # the transport of a closed session has no MTU
         cause, since = self.trouble or ("", None)
         if since is None:
             since = now
@@ -142,7 +148,7 @@ def _check(
 
 def _unused(session: board.Session, kind: int) -> list[int]:
     """The indices that no object of a kind has, nor one whose DELETE is not acknowledged."""
-    used = {entity.object_id(step) for entity in session.entities for step in range(entity.steps)}
+    used = {entity.object_id(step) for entity in session.entities for step in range(steps(entity))}
 
     def deleted(buf: Buffer, off: int, n: int) -> None:
         """Takes the DELETEs out of ``n`` bytes of submessages."""

@@ -6,7 +6,7 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
 
-    from muros.client.link import Link
+    from muros.client.session import Session
 
 SESSION = const(1)
 OUT_OF_STEP = const(2)
@@ -32,7 +32,7 @@ _STATUS = (
 )
 
 
-def tell(session: "Link", code: int, value: int, what: "Any") -> None:
+def tell(session: "Session", code: int, value: int, what: "Any") -> None:
     """Tells ``on_problem``, but why there is no way to the agent only when that changes; arguments as for ``text``."""
     said = text(code, value, what)
     if code == _UNREACHABLE:

@@ -5,12 +5,8 @@ of that WRITE_DATA. At the replier a request begins with the identity of its sam
 has to begin with the same.
 """
 
-from muros.client.entities import Entity, publish
-from muros.client.link import CONNECTED
-from muros.client.names import dds_type, topic_name
-from muros.client.qos import profile
+from muros.client.session import Entity
 from muros.compat import const, copy
-from muros.xrce.create import read_data
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -18,90 +14,35 @@ if TYPE_CHECKING:
     from typing import Any
 
     from muros.client._types import Message, Outgoing
-    from muros.client.entities import Participant
-    from muros.client.qos import AnyQos
-    from muros.client.session import Session
     from muros.xrce._types import Buffer
 
     OnReply = Callable[[int, Buffer, int, int], object]
     OnRequest = Callable[[bytes, Buffer, int, int], object]
 
-_KIND_REQUESTER = const(7)
-_KIND_REPLIER = const(8)
-_QOS_RELIABLE = const(0x01)
-_STREAM_BEST_EFFORT = const(0x01)
-_STREAM_RELIABLE = const(0x80)
-_UNLIMITED_SAMPLES = const(0xFFFF)
+_CONNECTED = const(2)
 _IDENTITY = const(24)
 
 
-class _Service(Entity):
-    """What both sides share. The names of topics and types in DDS are those that ROS gives them."""
+class Service(Entity):
+    """What both sides share."""
 
-    kind = 0
-    reads = 1
-
-    def __init__(
-        self,
-        session: "Session",
-        node: "Participant",
-        name: str,
-        kind: str,
-        callback: "Any",
-        qos: "AnyQos",
-    ) -> None:
+    def __init__(self, callback: "Any") -> None:
         self.callback = callback
-        self.node = node
-        self.type_name = kind
-        self.name = name
-        self.stream = session.output(profile(qos).flags & _QOS_RELIABLE)
-        self.session = session
-        self.index = session.index(self.kind)
-        self.variant(0)  # complains now about what cannot be
-        session.objects[self.object_id(0)] = self
-        super().__init__(session, name)
-
-    def object_id(self, step: int) -> int:
-        """The id of the requester or replier."""
-        return self.index << 4 | self.kind
-
-    def variant(self, step: int) -> bytes:
-        """Its representation."""
-        name = self.name
-        made: bytes = self.session.create.service(
-            self.kind,
-            name,
-            dds_type(self.type_name, "_Request"),
-            dds_type(self.type_name, "_Response"),
-            topic_name("rq", name, "Request"),
-            topic_name("rr", name, "Reply"),
-            self.node.object_id(0),
-        )
-        return made
 
     def room(self) -> bool:
         """Whether a sample that is written now can go out."""
         session = self.session
         stream = session.reliable
         return (
-            session.state == CONNECTED
+            session.state == _CONNECTED
             and session.backlog is None
             and self.todo == 0
             and (self.stream is not stream or stream.next - stream.first & 0xFFFF < stream.history)
         )
 
-    def reading(self) -> bytes:
-        """The read specification: everything, for ever."""
-        stream_id = _STREAM_RELIABLE if self.stream.reliable else _STREAM_BEST_EFFORT
-        return read_data(stream_id, _UNLIMITED_SAMPLES, 0, 0, 0)
 
-    publish = publish
-
-
-class Requester(_Service):
+class Requester(Service):
     """The client's side. ``callback(number, buf, off, n)`` gets replies, with the number that ``send`` gave."""
-
-    kind = _KIND_REQUESTER
 
     def send(self, request: "Message") -> int:
         """Sends a request; its number, or 0 when it was not taken."""
@@ -113,10 +54,8 @@ class Requester(_Service):
             self.callback(buf[off] << 8 | buf[off + 1], buf, off + 4, n - 4)
 
 
-class Replier(_Service):
+class Replier(Service):
     """The server's side. ``callback(identity, buf, off, n)`` gets requests; ``reply`` answers them, at any time."""
-
-    kind = _KIND_REPLIER
 
     def reply(self, identity: bytes, reply: "Message") -> bool:
         """Answers the request of that identity; False when it was not taken."""

@@ -1,50 +1,47 @@
-"""A session with an agent and everything created in it: participants, writers, readers, requesters, repliers.
+"""A session with an agent, as it runs while it is connected: messages come and go, and the agent is watched.
 
-Every entity is created again whenever the connection is made anew (see ``link``). Requests go out a few at a time
-and in the order of adding, each matched with its STATUS by request id and object id and asked for again when none
-comes; creating twice does no harm, as REUSE and REPLACE are set. A refused entity is reported and left alone, the
-others go on. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.3 and 7.8.5.
+A session holds everything that was created in it, and creates it again whenever the connection is made anew. What that
+takes boards borrow: ``link`` leads the connection (the ``guide``, held until everything is steady), ``methods`` and
+``entities`` hold what programs call now and then.
 """
 
-from array import array
+from struct import pack_into
 
-from muros.client.link import CONNECTING, Link
-from muros.compat import MPY, const, sleep_ms, ticks_diff, ticks_ms
-from muros.xrce import create
-from muros.xrce.create import head
-from muros.xrce.inputs import Input
-from muros.xrce.outputs import Output
+from muros.compat import borrow, const, lend, loans, release, sleep_ms, ticks_add, ticks_diff, ticks_ms
+from muros.xrce.session import SessionCore, flush
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
+    from array import array
     from collections.abc import Callable
     from typing import Any, Unpack
 
+    from muros.client import entities, methods
     from muros.client._types import OnData, Options, Outgoing, Transport
     from muros.client.backlog import Backlog
-    from muros.client.entities import Entity, Participant, Writer
-    from muros.client.qos import AnyQos
-    from muros.client.reader import Reader
-    from muros.client.services import OnReply, OnRequest, Replier, Requester
+    from muros.client.qos import Qos
     from muros.xrce._types import Buffer
+    from muros.xrce.streams import Output
 
-_STATUS = const(5)
+_CONNECTED = const(2)
+_LOST = const(3)
+_GET_INFO = const(2)
+_STATUS_AGENT = const(4)
+_INFO = const(6)
+_WRITE_DATA = const(7)
 _DATA = const(9)
 _TIMESTAMP_REPLY = const(15)
-_STREAM_BEST_EFFORT = const(0x01)
-_STREAM_RELIABLE = const(0x80)
-_OBJECT_CLIENT = const(0xFFFE)
-_MADE = const(1)
-_TOO_LONG = const(4)
-_PROBLEM_LARGEST = const(10)
-_INDICES = const(4096)
+_LITTLE_ENDIAN = const(0x01)
+_OBJECT_AGENT = const(0xFFFD)
+_FIRST_REQUEST = const(10)
+_CONTROL = const(8)
+_FOREIGN = const(8)
+_NEVER = const(5000)
 
-NO_READER = const(3)
-
-_PROBLEM_NO_ANSWER = const(5)
+_NO_READER = const(3)
 
 
-class Session(Link):
+class Session(SessionCore):
     """A session with an agent over ``transport``. Nothing but wrong arguments raises; faults change ``state``.
 
     On hosts ``muros.client.Session`` is a subclass, which checks arguments and prints problems, see ``hosts``.
@@ -64,12 +61,58 @@ class Session(Link):
     larger than a message, because they were for no reader of ours, because they were larger than ``largest``.
     """
 
-    creation = "binary"
-    reference = "participant_profile"
-    queue = 0
-    largest = 0
-    heartbeat = 100
-    creation_timeout = 1000
+    raised: "Exception | None" = None  # what a callback raised
+    guide: "Any" = None  # the module ``link`` while there is more to do than to watch
+    backlog: "Backlog | None" = None
+    on_state: "Callable[[int], object] | None" = None
+    on_problem: "Callable[[int, str], object] | None" = None
+
+    if TYPE_CHECKING:
+        transport: "Transport"
+        mtu: int
+        state: int
+        request: int  # behind the request id that was used last
+        login: bool  # the agent has yet to accept us
+        up: bool  # the transport is open
+        reliable: "Output"
+        drops: "array[int]"
+        objects: "dict[int, Any]"  # what takes DATA, by object id; what takes other submessages, by minus their kind
+        entities: "list[Entity]"
+        pending: int  # entities that are not whole yet
+        waiting: int  # requests without a STATUS
+        counts: "array[int]"  # the next index for each kind of object
+        notes: "dict[str, Any]"  # settings and whatever else only the guide needs
+        trouble: "tuple[str, int | None] | None"  # what was told that keeps us from the agent
+        queue: int
+        keepalive: int
+        ping_timeout: int
+        ping_attempts: int
+        _deliver: "OnData"
+        _due: "int | None"  # the tick of the next attempt; None: at once
+        _heard: int
+        _tries: int
+        _ping: int  # the request id of the question that is open
+
+        participant = methods.participant
+        writer = methods.writer
+        reader = methods.reader
+        requester = methods.requester
+        replier = methods.replier
+        ping = methods.ping
+        close = methods.close
+        output = methods.output
+        index = methods.index
+        make_input = methods.make_input
+        too_long = methods.too_long
+        problem = methods.problem
+        stranger = methods.stranger
+        defer = methods.defer
+        attempting = methods.attempting
+        gone = methods.gone
+    else:
+
+        def __getattr__(self, name):
+            return lend(self, "muros.client.methods", name)
 
     def __init__(
         self,
@@ -80,79 +123,69 @@ class Session(Link):
         history: int = 4,
         **options: "Unpack[Options]",
     ) -> None:
-        mtu = (mtu or transport.mtu) - 4
-        super().__init__(transport, client_key, session_id, mtu)
-        for name in options:
-            if not hasattr(Session, name):
-                raise TypeError("Session has no option " + name)
-            setattr(self, name, options[name])  # type: ignore[literal-required]
-        self.largest = self.largest or mtu * history * (1 if MPY else 64)
-        self.reliable = Output(_STREAM_RELIABLE, mtu, self.head, history, self.heartbeat)
-        self.outputs[_STREAM_RELIABLE] = self.reliable
-        self.inputs[_STREAM_RELIABLE] = Input(_STREAM_RELIABLE, mtu, history)
-        self.create: "Any" = create
-        if self.creation != "binary":
-            from muros.xrce import create_text
+        borrow("muros.client.start").start(self, transport, client_key, session_id, mtu, history, options)
+        release()
 
-            self.create = (
-                create_text.Xml() if self.creation == "xml" else create_text.Reference(self.reference)
-            )
-        self.drops = array("I", (0, 0, 0, 0, 0))
-        self.entities: "list[Entity]" = []
-        self.objects: "dict[int, Any]" = {}  # what takes DATA, by object id
-        self.backlog: "Backlog | None" = None
-        self.pending = 0  # entities that are not whole yet
-        self.waiting = 0  # requests without a STATUS
-        self.counts = array("H", bytearray(18))  # the next index for each kind of object
-        self.late = 0  # the tick when those are made again
-        self.laps = 0  # how often that happened since the last STATUS
+    def spin_once(self, now: "int | None" = None) -> int:
+        """Takes what has come and does what is due; returns the number of messages taken. Never waits.
 
-    def participant(self, name: str, domain: int = 0) -> "Participant":
-        """A DDS participant, the node of ROS. ValueError for a name longer than 59 characters, or for no domain."""
-        from muros.client.entities import Participant
+        What a callback raises comes out here once everything else is done; what it was told counts as told.
+        """
+        if now is None:
+            now = ticks_ms()
+        self.now = now
+        taken = _receive(self) if self.up else 0
+        if self.guide is None and self.up and self.pending == 0 and self.foreign < _FOREIGN:
+            if loans:
+                release()
+            self.watch(now)
+        else:
+            self.lead().turn(self, now)
+        if not self.login and self.state != _LOST:
+            if self.backlog is not None:
+                self.backlog.pump()
+            flush(self, self.reliable, now)
+        if self.raised is not None:
+            raised, self.raised = self.raised, None
+            raise raised
+        return taken
 
-        return Participant(self, name, domain)
+    def lead(self) -> "Any":
+        """The guide, from now on until everything is steady."""
+        if self.guide is None:
+            release()
+            self.guide = borrow("muros.client.link")
+        return self.guide
 
-    def writer(self, node: "Participant", topic: str, kind: str, qos: "AnyQos" = "default") -> "Writer":
-        """A writer of ``topic`` with messages of a type, named as in ROS or in DDS. ``publish(message)`` sends."""
-        from muros.client.entities import Writer
+    def watch(self, now: int) -> None:
+        """Asks whether the agent is there, after a silence."""
+        if self.keepalive == 0 or ticks_diff(now, self._heard) < self.keepalive:
+            self._ping = self._tries = 0
+        elif self._ping == 0 or ticks_diff(now, self._due) >= 0:  # type: ignore[arg-type]
+            self._due = ticks_add(now, self.ping_timeout)
+            self._tries += 1
+            if self._tries > self.ping_attempts:
+                self.lead().silent(self)
+            else:
+                self.ask()
 
-        return Writer(self, node, topic, kind, qos)
+    def ask(self) -> None:
+        """Asks the agent whether it knows the session."""
+        if self._ping == 0:
+            self._ping = self.number()
+        buf = self._control
+        buf[_CONTROL] = _GET_INFO
+        buf[_CONTROL + 2] = 8
+        pack_into(">HHI", buf, _CONTROL + 4, self._ping, _OBJECT_AGENT, 0x02000000)
+        self.send(buf, _CONTROL - len(self.head), len(self.head) + 12)
 
-    def reader(
-        self,
-        node: "Participant",
-        topic: str,
-        kind: str,
-        qos: "AnyQos" = "default",
-        on_data: "OnData | None" = None,
-    ) -> "Reader":
-        """A reader of ``topic``; ``on_data(buf, off, n)`` gets each sample, whose bytes are only lent."""
-        from muros.client.reader import Reader
-
-        return Reader(self, node, topic, kind, qos, on_data)
-
-    def requester(
-        self, node: "Participant", name: str, kind: str, on_reply: "OnReply", qos: "AnyQos" = "services"
-    ) -> "Requester":
-        """A client of the service ``name``; ``on_reply(number, buf, off, n)`` gets replies, see ``services``."""
-        from muros.client.services import Requester
-
-        return Requester(self, node, name, kind, on_reply, qos)
-
-    def replier(
-        self, node: "Participant", name: str, kind: str, on_request: "OnRequest", qos: "AnyQos" = "services"
-    ) -> "Replier":
-        """A server of the service ``name``; ``on_request(identity, buf, off, n)`` gets requests, see ``services``."""
-        from muros.client.services import Replier
-
-        return Replier(self, node, name, kind, on_request, qos)
-
-    def ping(self, timeout: int = 1000, clock: "Callable[[], int]" = ticks_ms) -> bool:
-        """Asks the agent, within the session: whether it answers within ``timeout`` ms and knows us."""
-        from muros.client.echo import ask
-
-        return ask(self, timeout, clock)
+    def number(self) -> int:
+        """A request id."""
+        request = self.request
+        if request == 0xFFFF:
+            request = _FIRST_REQUEST
+        self.request = request + 1
+        return request
 
     def wait(self, timeout: int) -> None:
         """Waits until something may have come, at most ``timeout`` ms."""
@@ -163,142 +196,119 @@ class Session(Link):
 
     def deadline(self, now: int) -> int:
         """Milliseconds from ``now`` until ``spin_once`` has something to do of its own accord."""
-        left = self.next(now)
-        if self.pending:
-            left = min(left, ticks_diff(self.late, now)) if self.waiting else 0
-        if not self.reliable.idle():
+        left = _NEVER
+        if self.guide is not None:
+            left = self.guide.deadline(self, now)
+        elif self.pending:
+            left = 0
+        elif self._ping:
+            left = ticks_diff(self._due, now)  # type: ignore[arg-type]
+        elif self.keepalive:
+            left = self.keepalive - ticks_diff(now, self._heard)
+        if self.reliable.first != self.reliable.next:
             left = min(left, ticks_diff(self.reliable.due, now))
         return max(left, 1)
 
-    def close(self) -> None:
-        """Takes leave of the agent, for at most one second, and closes the transport."""
-        from muros.client.closing import close
+    def deliver(self, buf: "Buffer", off: int, n: int) -> None:
+        """Takes a message of the transport."""
+        size = len(self.head)
+        if self.login and (n <= size or buf[off + size] != _STATUS_AGENT):
+            return  # it is about the streams of the session that was
+        if self.receive(buf, off, n, self.now):
+            self._heard = self.now
 
-        close(self)
-
-    # For entities
-
-    def output(self, reliable: int) -> "Output":
-        """The stream to write to; the one for best effort is made at the first need."""
-        if reliable:
-            return self.reliable
-        if _STREAM_BEST_EFFORT not in self.outputs:
-            self.outputs[_STREAM_BEST_EFFORT] = Output(_STREAM_BEST_EFFORT, self.mtu, self.head)
-        return self.outputs[_STREAM_BEST_EFFORT]  # type: ignore[no-any-return]
-
-    def make_input(self, stream_id: int) -> "Input | None":
-        """The stream for best effort is made when something comes on it; there are no others."""
-        if stream_id != _STREAM_BEST_EFFORT:
-            return None
-        made = self.inputs[stream_id] = Input(stream_id)
-        return made
-
-    def index(self, kind: int) -> int:
-        """A new index for an object of a kind. ValueError after the last; hosts use those of deleted objects again."""
-        index = self.counts[kind]
-        if index == _INDICES:
-            raise ValueError("no room for one more: a session has at most 4096 objects of a kind")
-        self.counts[kind] = index + 1
-        return index
-
-    def add(self, entity: "Entity") -> None:
-        """Has an entity created, now or when the session is connected."""
-        self.entities.append(entity)
-        entity.renew()
-        self.pending += 1
-
-    def submit(
-        self, kind: int, flags: int, request: int, object_id: int, payload: "bytes | bytearray"
-    ) -> bool:
-        """Puts a submessage with ids into the reliable stream; False when there is no room now."""
-        n = 4 + len(payload)
-        stream = self.reliable
-        backlog = self.backlog
-        at = -1 if backlog is not None and backlog.cutter is not None else stream.reserve(n)
-        if at < 0:
-            if n <= stream.capacity():
-                return False
-            data = bytearray(4 + n)
-            head(data, 0, kind, flags, n, request, object_id)
-            data[8:] = payload
-            return self.keep().first(data)
-        head(stream.buf, at, kind, flags, n, request, object_id)
-        stream.buf[at + 8 : at + 4 + n] = payload
-        return True
-
-    def defer(self, writer: "Any", message: "Outgoing", n: int) -> bool:
-        """What becomes of a sample that cannot go out now: it is queued, cut up, or refused and counted."""
-        return self.keep().defer(writer, message, n)
-
-    def too_long(self, stream_id: int, n: int) -> None:
-        """A sample that came was larger than ``largest``."""
-        from muros.client.backlog import dropped
-
-        dropped(self, _TOO_LONG, _PROBLEM_LARGEST, n)
-
-    def keep(self) -> "Backlog":
-        """The backlog, made at the first need."""
-        if self.backlog is None:
-            from muros.client.backlog import Backlog
-
-            self.backlog = Backlog(self)
-        return self.backlog
-
-    # Connecting
-
-    def accepted(self) -> None:
-        """Begins the streams again and has every entity created."""
-        if not self.reliable.idle() or self.backlog is not None:
-            self.keep().hold()
-        self.reset()
-        self.waiting = 0
-        self.pending = len(self.entities)
-        for entity in self.entities:
-            entity.renew()
-
-    def work(self, now: int) -> None:
-        """Creates what is to be created, and sends what waits."""
-        if self.pending:
-            if self.waiting and ticks_diff(now, self.late) >= 0:
-                self.waiting = 0
-                for entity in self.entities:
-                    entity.asked = 0
-                self.laps += 1
-                if self.laps == 3:
-                    self.problem(_PROBLEM_NO_ANSWER)
-            for entity in self.entities:
-                if entity.todo and not entity.create(now):
-                    break
-        if self.pending == 0 and self.state == CONNECTING:
-            self.happened(_MADE)
-        if self.backlog is not None:
-            self.backlog.pump()
-
-    def _on(self, kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
+    def take(self, kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
+        """Takes a submessage."""
         try:
             if kind == _DATA:
                 reader = self.objects.get(buf[off + 2] << 8 | buf[off + 3]) if n >= 4 else None
                 if reader is None:
-                    self.drops[NO_READER] += 1
-                else:
+                    self.drops[_NO_READER] += 1
+                elif reader.deliver:
                     reader.deliver(buf, off + 4, n - 4)
-            elif kind == _STATUS:
-                if n >= 6:
-                    self._on_status(
-                        buf[off] << 8 | buf[off + 1], buf[off + 2] << 8 | buf[off + 3], buf[off + 4]
-                    )
-            elif kind == _TIMESTAMP_REPLY and n >= 24 and self.on_time is not None:
-                self.on_time(buf, off)
             else:
-                self.on_other(kind, buf, off, n)
+                if -kind in self.objects:
+                    self.objects[-kind](buf, off, n)
+                if kind == _INFO and self.guide is None and n >= 6 and buf[off + 5]:
+                    pass  # the agent is there, as we thought
+                elif kind != _TIMESTAMP_REPLY:
+                    self.lead().answer(self, kind, buf, off, n)
         except Exception as error:  # of a callback: the message counts as handled
             self.raised = error
         return 0
 
-    def _on_status(self, request: int, object_id: int, status: int) -> None:
-        if object_id == _OBJECT_CLIENT:
-            self.login = True  # the agent has taken our leave
-            return
-        for entity in self.entities:
-            if entity.answered(request - entity.request, object_id, status):
-                return
+
+class Entity:
+    """What a session creates at the agent: a participant, a writer, a reader, or one side of a service.
+
+    It stands for the objects that make it up, one for each step of its creation, see ``entities``. ``name`` is its name
+    in DDS; ``status`` is that of the request the agent refused, 0 while none was. ``todo`` is 0 once everything is
+    created.
+    """
+
+    status = 0
+
+    if TYPE_CHECKING:
+        session: Session
+        name: str
+        id: int  # of its last object: index << 4 | kind
+        todo: int  # bit i: step i has no good STATUS yet; bit 4 + i: its request is under way; bit 8: refused
+        request: int  # the id of the first request, one more for each step
+        type_name: str
+        qos: "Qos"
+        topic: int  # the topic's id
+        parent: int  # the participant's id
+        domain: int
+        stream: "Output"  # a writer's
+        deliver: "OnData | None"  # a reader's, a service's
+        limits: "tuple[int, int, int, int]"  # what ``read`` asked for
+
+        object_id = entities.object_id
+        destroy = entities.destroy
+        write_bytes = entities.write_bytes
+        read = entities.read
+    else:
+
+        def __getattr__(self, name):
+            return lend(self, "muros.client.entities", name)
+
+    def publish(self, message: "Outgoing") -> bool:
+        """Sends a message. False when it was not taken: the session's ``drops`` and ``on_problem`` say why.
+
+        A reliable message that was taken arrives once and in order for as long as the agent keeps the session; when
+        the session begins anew, what was not acknowledged is sent again.
+        """
+        session = self.session
+        n = message.size()
+        if self.todo == 0 and session.state == _CONNECTED and session.backlog is None:
+            at = self.stream.place(n + 4)
+            if at >= 0:
+                _head(self, at, n + 4)
+                message.write(self.stream.buf, at + 8)
+                self.stream.commit(at, n + 4)
+                self.stream.flush(session.send, session.now)
+                return True
+        return session.defer(self, message, n)
+
+
+def _receive(session: Session) -> int:
+    """Takes what has come; the number of messages. The transport raises when the way is gone."""
+    try:
+        return session.transport.receive(session._deliver)
+    except OSError as error:
+        session.gone(error)
+        return 0
+
+
+def _head(entity: Entity, at: int, n: int) -> None:
+    """Writes the header of a WRITE_DATA."""
+    buf = entity.stream.buf
+    buf[at] = _WRITE_DATA
+    buf[at + 1] = _LITTLE_ENDIAN
+    buf[at + 2] = n & 255
+    buf[at + 3] = n >> 8
+    n = entity.session.number()
+    buf[at + 4] = n >> 8
+    buf[at + 5] = n & 255
+    buf[at + 6] = entity.id >> 8
+    buf[at + 7] = entity.id & 255

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from muros.xrce._types import Buffer
 
 _TIMESTAMP = const(14)
+_TIMESTAMP_REPLY = const(15)
+_CONTROL = const(8)
 _KEPT = const(8)
 _DRIFT = const(100)  # parts per million
 _MILLION = const(1_000_000)
@@ -39,7 +41,7 @@ class TimeSync:
         self._best: "tuple[int, int, int, int]" = (0, 0, 0, 0)
         self._asked = 0
         self._waiting = False
-        session.on_time = self._on_reply
+        session.objects[-_TIMESTAMP_REPLY] = self._on_reply
 
     def request(self, now: "int | None" = None) -> None:
         """Asks the agent for its time; ``now`` is the tick in microseconds."""
@@ -48,11 +50,12 @@ class TimeSync:
         self._asked = now
         self._waiting = True
         session = self.session
-        at = session.control(_TIMESTAMP, 8)
-        out = session.control_buffer()
-        _put(out, at, now // _MILLION)
-        _put(out, at + 4, now % _MILLION * 1000)
-        session.send_control()
+        out = session._control
+        out[_CONTROL] = _TIMESTAMP
+        out[_CONTROL + 2] = 8
+        _put(out, _CONTROL + 4, now // _MILLION)
+        _put(out, _CONTROL + 8, now % _MILLION * 1000)
+        session.send(out, _CONTROL - len(session.head), len(session.head) + 12)
 
     def synchronized(self) -> bool:
         """Whether the agent has answered yet."""
@@ -83,13 +86,14 @@ class TimeSync:
     def _error(self, exchange: "tuple[int, int, int, int]", now: int) -> int:
         return (exchange[0] + 1) // 2 + ticks_diff(now, exchange[1]) * self.drift // _MILLION + 1
 
-    def _on_reply(self, buf: "Buffer", off: int, now: "int | None" = None) -> None:
+    def _on_reply(self, buf: "Buffer", off: int, n: int, now: "int | None" = None) -> None:
         """Takes a TIMESTAMP_REPLY: when it left the agent, when our request came there, our stamp."""
         if now is None:
             now = ticks_us()
         asked = self._asked
         if (
-            not self._waiting
+            n < 24
+            or not self._waiting
             or _get(buf, off + 16) != asked // _MILLION
             or _get(buf, off + 20) != asked % _MILLION * 1000
         ):

@@ -10,20 +10,20 @@ The same source runs on MicroPython and on CPython. Names are imported when they
 only what its program needs. Hosts have classes that check more and say more, see ``hosts``.
 """
 
-from muros.compat import MPY, const
+from muros.compat import MPY, borrow, const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.client.qos import Qos as Qos
+    from muros.rclc.client import Client as Client
     from muros.rclc.context import Context as Context
+    from muros.rclc.context import Node as Node
     from muros.rclc.errors import CapacityError as CapacityError
     from muros.rclc.errors import InvalidNameError as InvalidNameError
     from muros.rclc.errors import RclError as RclError
     from muros.rclc.executor import Executor as Executor
     from muros.rclc.guard import GuardCondition as GuardCondition
     from muros.rclc.middleware import register as register
-    from muros.rclc.node import Node as Node
-    from muros.rclc.service import Client as Client
     from muros.rclc.service import Service as Service
     from muros.rclc.subscription import Subscription as Subscription
     from muros.rclc.timer import Timer as Timer
@@ -31,25 +31,26 @@ if TYPE_CHECKING:
     from muros.rclc.triggers import any_of as any_of
     from muros.rclc.triggers import one as one
 
-_MODULES = (
-    "Context context CapacityError errors InvalidNameError errors RclError errors Executor executor "
-    "GuardCondition guard register middleware Node node Client service Service service Subscription subscription "
-    "Timer timer all_of triggers any_of triggers one triggers"
-)
 if not MPY:
-    _MODULES = (
-        "Client hosts Context hosts Executor hosts Node hosts Service hosts Subscription hosts " + _MODULES
-    )
-    __all__ = ["Qos"] + _MODULES.split()[::2]
+    __all__ = [
+        "CapacityError",
+        "Client",
+        "Context",
+        "Executor",
+        "GuardCondition",
+        "InvalidNameError",
+        "Node",
+        "Qos",
+        "RclError",
+        "Service",
+        "Subscription",
+        "Timer",
+        "all_of",
+        "any_of",
+        "one",
+        "register",
+    ]
 
 
 def __getattr__(name: str) -> object:
-    if name == "Qos":
-        from muros.client.qos import Qos
-
-        return Qos
-    words = _MODULES.split()
-    for i in range(0, len(words), 2):
-        if words[i] == name:
-            return getattr(__import__("muros.rclc." + words[i + 1], None, None, (name,)), name)
-    raise AttributeError(name)
+    return borrow("muros.exports").find("rclc", name)

@@ -1,17 +1,18 @@
-"""The context: one way into the ROS graph, and the nodes on it."""
+"""The context and its nodes: one way into the ROS graph, and what is made on it.
 
-from muros.compat import const, ticks_ms
+Their methods are called when a program begins and ends: boards borrow them, from ``contexts`` and ``node``.
+"""
+
+from muros.compat import borrow, const, lend
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from muros.rclc._types import Middleware
+    from muros.rclc import contexts, node
+    from muros.rclc._types import Entity, Middleware
     from muros.rclc.executor import Handle
-    from muros.rclc.node import Node
-
-STATES = ("WAITING", "CONNECTING", "CONNECTED", "LOST")
 
 
 class Context:
@@ -21,44 +22,56 @@ class Context:
     session that is made here; a random one if it is None. On hosts ``muros.rclc.Context`` is a subclass, see ``hosts``.
     """
 
+    if TYPE_CHECKING:
+        middleware: "Middleware"
+        domain_id: int
+        handles: "list[Handle]"  # what no executor has claimed, in the order of making
+        running: bool
+        clock: "Callable[[], int]"  # what timers and executors go by
+
+        node = contexts.node
+        on_state = contexts.on_state
+        on_problem = contexts.on_problem
+        ping = contexts.ping
+        close = contexts.close
+    else:
+
+        def __getattr__(self, name):
+            return lend(self, "muros.rclc.contexts", name)
+
     def __init__(self, way: "Any", client_key: "int | bytes | None" = None, domain_id: int = 0) -> None:
-        if not hasattr(way, "participant"):
-            from muros.client.session import Session
-
-            way = Session(way, client_key)
-        self.middleware: "Middleware" = way
-        self.domain_id = domain_id
-        self.handles: "list[Handle]" = []  # what no executor has claimed, in the order of making
-        self.running = True
-        self.clock: "Callable[[], int]" = ticks_ms  # what timers and executors go by
-
-    def node(self, name: str, namespace: str = "") -> "Node":
-        """A node. Raises InvalidNameError."""
-        from muros.rclc.node import Node
-
-        return Node(self, name, namespace)
+        borrow("muros.rclc.contexts").begin(self, way, client_key, domain_id)
 
     @property
     def state(self) -> str:
         """WAITING, CONNECTING, CONNECTED or LOST."""
-        return STATES[self.middleware.state]
+        name: str = borrow("muros.rclc.contexts").STATES[self.middleware.state]
+        return name
 
-    def on_state(self, callback: "Callable[[str], object]") -> None:
-        """Calls ``callback(state)`` at each change."""
-        self.middleware.on_state = lambda state: callback(STATES[state])
 
-    def on_problem(self, callback: "Callable[[int, str], object]") -> None:
-        """Calls ``callback(code, text)`` when something was dropped or refused, or no agent is reached.
+class Node:
+    """A node of a context. Topics and services are named relative to ``namespace`` unless they begin with a slash.
 
-        Without it hosts print the text on standard error.
-        """
-        self.middleware.on_problem = callback
+    Message types are generated classes, ``Int32`` or ``AddTwoInts``. ``qos`` is a profile's name or a ``Qos``.
+    What is made here raises InvalidNameError for names that ROS does not take, ValueError for those too long.
+    """
 
-    def ping(self, timeout: float = 1.0) -> bool:
-        """Whether the agent answers within ``timeout`` seconds and knows us; messages wait meanwhile."""
-        return self.middleware.ping(int(timeout * 1000), self.clock)
+    if TYPE_CHECKING:
+        context: Context
+        name: str
+        namespace: str
+        entities: "list[Entity]"
+        participant: "Any"
 
-    def close(self) -> None:
-        """Takes leave of the graph; executors end."""
-        self.running = False
-        self.middleware.close()
+        publisher = node.publisher
+        subscription = node.subscription
+        timer = node.timer
+        service = node.service
+        client = node.client
+        destroy = node.destroy
+        _topic = node._topic
+        _resolve = node._resolve
+    else:
+
+        def __getattr__(self, name):
+            return lend(self, "muros.rclc.node", name)

@@ -2,16 +2,17 @@
 
 One pass looks at every handle in turn; what is ready gives one piece of work to its callback. Between passes the
 executor lets the middleware work and waits for whatever comes first: a message, a timer, or a deadline of the
-middleware.
+middleware. What programs ask of executors and handles now and then boards borrow, see ``handles``.
 """
 
-from muros.compat import const, ticks_add, ticks_diff
+from muros.compat import const, lend, ticks_add, ticks_diff
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
+    from muros.rclc import handles
     from muros.rclc.context import Context
 
 _TIMEOUT = const(1000)  # ms that one round of ``spin`` waits at most
@@ -37,31 +38,14 @@ class Executor:
         self.trigger = trigger
         self.handles: "list[Any]" = context.handles
 
-    def add(self, handle: "Any", callback: "Callable[..., object] | None" = None) -> None:
-        """Runs a handle from now on, behind those added before; with ``callback`` in place of its own.
+    if TYPE_CHECKING:
+        add = handles.add
+        remove = handles.remove
+        spin_period = handles.spin_period
+    else:
 
-        Raises CapacityError when the executor is full.
-        """
-        if self.handles is self.context.handles:
-            self.handles = []
-        if self.capacity and len(self.handles) >= self.capacity:
-            from muros.rclc.errors import CapacityError
-
-            raise CapacityError(
-                "executor is full: %d handles of %d in use. Create it with handles=%d."
-                % (self.capacity, self.capacity, self.capacity + 1)
-            )
-        if handle in self.context.handles:
-            self.context.handles.remove(handle)
-        if callback is not None:
-            handle.callback = callback
-        handle.eager = self.trigger is None
-        handle.handles = self.handles
-        self.handles.append(handle)
-
-    def remove(self, handle: "Any") -> None:
-        """Runs a handle no more; the others keep their order. ValueError when it is not here."""
-        self.handles.remove(handle)
+        def __getattr__(self, name):
+            return lend(self, "muros.rclc.handles", name)
 
     def spin(self) -> None:
         """Runs until the context is closed."""
@@ -73,18 +57,6 @@ class Executor:
         return self.round(int(timeout * 1000))
 
     spin_once = spin_some
-
-    def spin_period(self, period: float) -> None:
-        """Makes one pass each ``period`` seconds until the context is closed; late ones are caught up."""
-        due = self.context.clock()
-        while self.context.running:
-            due = ticks_add(due, int(period * 1000))
-            self.work(self.context.clock())
-            left = ticks_diff(due, self.context.clock())
-            while left > 0:
-                self.context.middleware.wait(left)
-                self.context.middleware.spin_once(self.context.clock())
-                left = ticks_diff(due, self.context.clock())
 
     def round(self, timeout: int) -> bool:
         """``spin_some`` with ``timeout`` in ms; allocates nothing."""
@@ -122,6 +94,17 @@ class Handle:
     entity: "Any" = None
     handles: "list[Any] | None" = None  # those of the executor that it was added to
 
+    if TYPE_CHECKING:
+        cancelled: bool
+        depth: int
+
+        def destroy(self) -> None:
+            """Takes it away, with all that waits."""
+    else:
+
+        def __getattr__(self, name):
+            return lend(self, "muros.rclc.handles", name)
+
     def __init__(self, context: "Context") -> None:
         self.context = context
         context.handles.append(self)
@@ -129,11 +112,3 @@ class Handle:
     def left(self, now: int) -> int:
         """Milliseconds until it is ready of its own accord: it never is."""
         return _NEVER
-
-    def destroy(self) -> None:
-        """Takes it away."""
-        handles = self.handles or self.context.handles
-        if self in handles:
-            handles.remove(self)
-        if self.entity is not None:
-            self.entity.destroy()

@@ -13,7 +13,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from muros.client import reasons
 from muros.client.hosts import Session
 from muros.client.names import topic_name
+from muros.client.qos import profile
+from muros.rclc import client as client_
 from muros.rclc import context as context_
+from muros.rclc import contexts, handles
 from muros.rclc import executor as executor_
 from muros.rclc import node as node_
 from muros.rclc import service as service_
@@ -36,6 +39,8 @@ _INVALID_ARGUMENT = 11
 _TOPIC_NAME_INVALID = 103
 _SERVICE_NAME_INVALID = 104
 _LARGEST_DOMAIN = 232
+_DEPTH = 1000
+"""Messages that wait in a subscription that keeps all."""
 _LONGEST_NAME = 59  # characters of a topic in DDS: agents take no more
 
 
@@ -97,9 +102,14 @@ class Context(context_.Context):
         """A node. Raises InvalidNameError."""
         return Node(self, name, namespace)
 
+    on_state = contexts.on_state
+    on_problem = contexts.on_problem
+    ping = contexts.ping
+    close = contexts.close
 
-class Node(node_.Node):
-    """A node of a context; see ``muros.rclc.node.Node``. Raises TypeError and ValueError for what cannot be made."""
+
+class Node(context_.Node):
+    """A node of a context; see ``muros.rclc.context.Node``. Raises TypeError and ValueError for what cannot be made."""
 
     context: Context
 
@@ -107,7 +117,7 @@ class Node(node_.Node):
         _be_text(name, "the name of a node")
         _be_text(namespace, "a namespace")
         try:
-            super().__init__(context, name, namespace)
+            node_.begin(self, context, name, namespace)
         except InvalidNameError:
             raise
         except ValueError as error:
@@ -116,7 +126,7 @@ class Node(node_.Node):
     def publisher(self, kind: Any, topic: str, qos: str | Qos = "default") -> Publisher:
         """A publisher: ``publish(message)`` returns whether the message was taken."""
         _be_message(kind)
-        return Publisher(super().publisher(kind, topic, qos), kind)
+        return Publisher(node_.publisher(self, kind, topic, qos), kind)
 
     def subscription(
         self, kind: Any, topic: str, callback: Callable[[Any], object] | None, qos: str | Qos = "default"
@@ -138,7 +148,7 @@ class Node(node_.Node):
                 f"the period of a timer is {period!r}: it must be a number of seconds, at least 0"
             )
         _be_callable(callback, "the callback of a timer")
-        return super().timer(period, callback, autostart)
+        return node_.timer(self, period, callback, autostart)
 
     def service(
         self, kind: Any, name: str, callback: Callable[[Any], Any], qos: str | Qos = "services"
@@ -183,7 +193,7 @@ class Node(node_.Node):
     def _resolve(self, name: str) -> str:
         _be_text(name, "the name of a topic or service")
         try:
-            return super()._resolve(name)
+            return node_._resolve(self, name)
         except ValueError as error:
             raise _invalid(error, _SERVICE_NAME_INVALID) from None
 
@@ -214,11 +224,42 @@ class Subscription(subscription_.Subscription):
 
     topic = ""
 
+    def __init__(
+        self, context: context_.Context, kind: Any, callback: Callable[[Any], object] | None, qos: str | Qos
+    ) -> None:
+        super().__init__(context, kind, callback)
+        self.depth = profile(qos).depth or _DEPTH
+        self._kind = kind
+        self._waiting: list[Any] = []
+
+    def take(self) -> Any:
+        """The oldest message that waits, or None."""
+        return self._waiting.pop(0) if self._waiting else None
+
+    def ready(self, now: int) -> bool:
+        """Whether a message waits."""
+        return len(self._waiting) > 0
+
     def deliver(self, buf: Buffer, off: int, n: int) -> None:
         """Takes a sample of the middleware."""
-        malformed = self.malformed
-        super().deliver(buf, off, n)
-        if self.malformed > malformed == 0:
+        if len(self._waiting) >= self.depth:
+            if self.eager:
+                self.run(0)
+            else:
+                self._waiting.pop(0)
+                self.lost += 1
+        message = self._kind()
+        try:
+            message.read(buf, off, n)
+        except ValueError:
+            self.malformed += 1
+            self._tell(n)
+        else:
+            self._waiting.append(message)
+
+    def _tell(self, n: int) -> None:
+        """Tells of the first malformed sample."""
+        if self.malformed == 1:
             said = (
                 f"a sample of {n} B on {self.topic!r} is no {self._kind.TYPE} and was dropped. "
                 "Does somebody publish another type there?"
@@ -248,17 +289,17 @@ class Service(service_.Service):
     def destroy(self) -> None:
         """Takes it away."""
         self.context.services.pop(self.name, None)
-        super().destroy()
+        handles.destroy(self)
 
 
-class Client(service_.Client):
-    """Made by ``Node.client``; see ``muros.rclc.service.Client``."""
+class Client(client_.Client):
+    """Made by ``Node.client``; see ``muros.rclc.client.Client``."""
 
     name = ""
     context: Context
 
     def send(
-        self, request: Any, on_reply: Callable[[Any], object], timeout: float = service_._TIMEOUT
+        self, request: Any, on_reply: Callable[[Any], object], timeout: float = client_._TIMEOUT
     ) -> bool:
         """Sends a request; an executor calls ``on_reply(response)``, with None after ``timeout`` seconds.
 
@@ -269,7 +310,7 @@ class Client(service_.Client):
         _be_callable(on_reply, "on_reply")
         return super().send(request, on_reply, timeout)
 
-    def call(self, request: Any, timeout: float = service_._TIMEOUT) -> Any:
+    def call(self, request: Any, timeout: float = client_._TIMEOUT) -> Any:
         """Sends a request and waits for its response; None when it does not come within ``timeout`` seconds.
 
         Not for callbacks, nor for a service of the same context: those run in an executor, where ``send`` belongs.
@@ -280,7 +321,7 @@ class Client(service_.Client):
                 f"service {self.name!r} is served by this very context, which does not run during call(). "
                 "Use send(request, on_reply) and an executor."
             )
-        return super().call(request, timeout)
+        return handles.call(self, request, timeout)
 
 
 class Executor(executor_.Executor):
@@ -316,7 +357,7 @@ class Executor(executor_.Executor):
             )
         if callback is not None:
             _be_callable(callback, "the callback of a handle")
-        super().add(handle, callback)
+        handles.add(self, handle, callback)
 
     def spin(self) -> None:
         """Runs until the context is closed or Ctrl-C is pressed."""
@@ -330,7 +371,7 @@ class Executor(executor_.Executor):
         if not isinstance(period, int | float) or not 0 < period < math.inf:
             raise WrongValueError(f"period is {period!r}: it must be a number of seconds above 0")
         try:
-            super().spin_period(period)
+            handles.spin_period(self, period)
         except KeyboardInterrupt:
             self.context.close()
 

@@ -1,4 +1,4 @@
-"""Nodes, and what is made on them."""
+"""The methods of nodes, which make what programs use. Boards borrow this."""
 
 from muros.client.names import resolve, topic_name
 from muros.compat import const
@@ -9,105 +9,108 @@ if TYPE_CHECKING:
     from typing import Any
 
     from muros.client.qos import Qos
-    from muros.rclc._types import Entity, Publisher
-    from muros.rclc.context import Context
-    from muros.rclc.service import Client, Service
+    from muros.rclc._types import Publisher
+    from muros.rclc.client import Client
+    from muros.rclc.context import Context, Node
+    from muros.rclc.service import Service
     from muros.rclc.subscription import Subscription
     from muros.rclc.timer import Timer
 
 
-class Node:
-    """A node of a context. Topics and services are named relative to ``namespace`` unless they begin with a slash.
+def begin(self: "Node", context: "Context", name: str, namespace: str) -> None:
+    """Sets up a node."""
+    if not namespace.startswith("/"):
+        namespace = "/" + namespace
+    _check(name)
+    if namespace != "/":
+        _check(namespace[1:])
+    self.context = context
+    self.name = name
+    self.namespace = namespace
+    self.entities = []
+    full = name if namespace == "/" else namespace + "/" + name
+    self.participant = context.middleware.participant(full, context.domain_id)
 
-    Message types are generated classes, ``Int32`` or ``AddTwoInts``. ``qos`` is a profile's name or a ``Qos``.
-    What is made here raises InvalidNameError for names that ROS does not take, ValueError for those too long.
+
+def publisher(self: "Node", kind: "Any", topic: str, qos: "str | Qos" = "default") -> "Publisher":
+    """A publisher: ``publish(message)`` returns whether the message was taken."""
+    made = self.context.middleware.writer(self.participant, self._topic(topic), kind.TYPE, qos)
+    self.entities.append(made)
+    return made
+
+
+def subscription(
+    self: "Node",
+    kind: "Any",
+    topic: str,
+    callback: "Callable[[Any], object] | None",
+    qos: "str | Qos" = "default",
+) -> "Subscription":
+    """A subscription; an executor calls ``callback(message)``.
+
+    On boards there is one message object, which the next message overwrites: copy what is to be kept.
     """
+    from muros.rclc.subscription import Subscription
 
-    def __init__(self, context: "Context", name: str, namespace: str) -> None:
-        if not namespace.startswith("/"):
-            namespace = "/" + namespace
-        _check(name)
-        if namespace != "/":
-            _check(namespace[1:])
-        self.context = context
-        self.name = name
-        self.namespace = namespace
-        self.entities: "list[Entity]" = []
-        full = name if namespace == "/" else namespace + "/" + name
-        self.participant = context.middleware.participant(full, context.domain_id)
+    made = Subscription(self.context, kind, callback)
+    made.entity = self.context.middleware.reader(
+        self.participant, self._topic(topic), kind.TYPE, qos, made.deliver
+    )
+    self.entities.append(made)
+    return made
 
-    def publisher(self, kind: "Any", topic: str, qos: "str | Qos" = "default") -> "Publisher":
-        """A publisher: ``publish(message)`` returns whether the message was taken."""
-        made = self.context.middleware.writer(self.participant, self._topic(topic), kind.TYPE, qos)
-        self.entities.append(made)
-        return made
 
-    def subscription(
-        self,
-        kind: "Any",
-        topic: str,
-        callback: "Callable[[Any], object] | None",
-        qos: "str | Qos" = "default",
-    ) -> "Subscription":
-        """A subscription; an executor calls ``callback(message)``.
+def timer(self: "Node", period: float, callback: "Callable[[], object]", autostart: bool = True) -> "Timer":
+    """A timer; an executor calls ``callback()`` every ``period`` seconds, to the millisecond."""
+    from muros.rclc.timer import Timer
 
-        On boards there is one message object, which the next message overwrites: copy what is to be kept.
-        """
-        from muros.rclc.subscription import Subscription
+    made = Timer(self.context, period, callback, autostart)
+    self.entities.append(made)
+    return made
 
-        made = Subscription(self.context, kind, callback, qos)
-        made.entity = self.context.middleware.reader(
-            self.participant, self._topic(topic), kind.TYPE, qos, made.deliver
-        )
-        self.entities.append(made)
-        return made
 
-    def timer(self, period: float, callback: "Callable[[], object]", autostart: bool = True) -> "Timer":
-        """A timer; an executor calls ``callback()`` every ``period`` seconds, to the millisecond."""
-        from muros.rclc.timer import Timer
+def service(
+    self: "Node", kind: "Any", name: str, callback: "Callable[[Any], Any]", qos: "str | Qos" = "services"
+) -> "Service":
+    """A server of a service; ``callback(request)`` returns the response, or None to answer later."""
+    from muros.rclc.service import Service
 
-        made = Timer(self.context, period, callback, autostart)
-        self.entities.append(made)
-        return made
+    made = Service(self.context, kind, callback)
+    made.entity = self.context.middleware.replier(
+        self.participant, self._resolve(name), kind.TYPE, made.deliver, qos
+    )
+    self.entities.append(made)
+    return made
 
-    def service(
-        self, kind: "Any", name: str, callback: "Callable[[Any], Any]", qos: "str | Qos" = "services"
-    ) -> "Service":
-        """A server of a service; ``callback(request)`` returns the response, or None to answer later."""
-        from muros.rclc.service import Service
 
-        made = Service(self.context, kind, callback)
-        made.entity = self.context.middleware.replier(
-            self.participant, self._resolve(name), kind.TYPE, made.deliver, qos
-        )
-        self.entities.append(made)
-        return made
+def client(self: "Node", kind: "Any", name: str, qos: "str | Qos" = "services") -> "Client":
+    """A client of a service."""
+    from muros.rclc.client import Client
 
-    def client(self, kind: "Any", name: str, qos: "str | Qos" = "services") -> "Client":
-        """A client of a service."""
-        from muros.rclc.service import Client
+    made = Client(self.context, kind)
+    made.entity = self.context.middleware.requester(
+        self.participant, self._resolve(name), kind.TYPE, made.deliver, qos
+    )
+    self.entities.append(made)
+    return made
 
-        made = Client(self.context, kind)
-        made.entity = self.context.middleware.requester(
-            self.participant, self._resolve(name), kind.TYPE, made.deliver, qos
-        )
-        self.entities.append(made)
-        return made
 
-    def destroy(self) -> None:
-        """Takes the node and everything made on it away."""
-        for entity in self.entities:
-            entity.destroy()
-        self.entities = []
-        self.participant.destroy()
+def destroy(self: "Node") -> None:
+    """Takes the node and everything made on it away."""
+    for entity in self.entities:
+        entity.destroy()
+    self.entities = []
+    self.participant.destroy()
 
-    def _topic(self, name: str) -> str:
-        return topic_name("rt", self._resolve(name))
 
-    def _resolve(self, name: str) -> str:
-        full = resolve(name, self.namespace, self.name)
-        _check(full[1:])
-        return full
+def _topic(self: "Node", name: str) -> str:
+    return topic_name("rt", self._resolve(name))
+
+
+def _resolve(self: "Node", name: str) -> str:
+    full = resolve(name, self.namespace, self.name)
+    _check(full[1:])
+    return full
 
 
 def _check(name: str) -> None:

@@ -7,6 +7,7 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from muros.rclc import handles
     from muros.rclc.context import Context
 
 _NEVER = const(1000000)
@@ -18,6 +19,9 @@ class Timer(Handle):
     """
 
     since = 0
+
+    if TYPE_CHECKING:
+        exchange_period = handles.exchange_period
 
     def __init__(
         self, context: "Context", period: float, callback: "Callable[[], object]", autostart: bool
@@ -38,12 +42,6 @@ class Timer(Handle):
         self.cancelled = False
         self._next = ticks_add(self.context.clock() if now is None else now, self.period)
 
-    def exchange_period(self, period: float) -> float:
-        """Sets the period in seconds, used from the next call on; returns the old one."""
-        old = self.period / 1000
-        self.period = int(period * 1000 + 0.5)
-        return old
-
     def ready(self, now: int) -> bool:
         """Whether its time has come."""
         return not self.cancelled and ticks_diff(now, self._next) >= 0
@@ -62,8 +60,3 @@ class Timer(Handle):
     def left(self, now: int) -> int:
         """Milliseconds until its time comes."""
         return _NEVER if self.cancelled else max(ticks_diff(self._next, now), 0)
-
-    def destroy(self) -> None:
-        """Takes it away."""
-        self.cancelled = True
-        super().destroy()

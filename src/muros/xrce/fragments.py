@@ -1,7 +1,8 @@
 """Samples larger than a message: cut into FRAGMENTs by the sender, joined by the receiver (DDS-XRCE 1.0, 8.3.5.14).
 
 The whole submessage, header and payload, is cut; each piece is the payload of a FRAGMENT, the last one flagged. Only
-reliable streams carry fragments, so the pieces come in order and none is missing.
+reliable streams carry fragments, so the pieces come in order and none is missing. Boards borrow this for as long as a
+sample is under way.
 """
 
 from muros.compat import const, copy
@@ -17,28 +18,8 @@ _HEAD = const(4)
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.xrce._types import Buffer
-    from muros.xrce.inputs import Input
-    from muros.xrce.outputs import Output
     from muros.xrce.session import SessionCore
-
-
-def take(session: "SessionCore", stream: "Input", buf: "Buffer", at: int, n: int, last: int) -> int:
-    """Takes a piece for ``session`` and handles what is whole with it; ``LATER`` when that has to wait."""
-    joiner = stream.fragments
-    if joiner is None:
-        joiner = stream.fragments = Joiner(session.largest, stream.stream_id)
-    if joiner.add(buf, at, n, last):
-        held = submessages(session, joiner.data, joiner.at, len(joiner.data), joiner)
-        if held != _DONE:
-            joiner.at = held
-            return _LATER
-    elif last:
-        session.malformed += 1
-        if joiner.too_long:
-            session.too_long(stream.stream_id, joiner.too_long)
-    if last:
-        joiner.clear()
-    return 0
+    from muros.xrce.streams import Input, Output
 
 
 class Joiner:
@@ -76,6 +57,26 @@ class Joiner:
             self.whole = bool(last)
         return self.whole
 
+    def take(
+        self, session: "SessionCore", stream: "Input", buf: "Buffer", off: int, n: int, last: int
+    ) -> int:
+        """Takes a piece for ``session`` and handles what is whole with it; ``LATER`` when that has to wait.
+
+        Behind the last piece ``stream`` has no use for the joiner any more.
+        """
+        if self.add(buf, off, n, last):
+            held = submessages(session, self.data, self.at, len(self.data), self)
+            if held != _DONE:
+                self.at = held
+                return _LATER
+        elif last:
+            session.malformed += 1
+            if self.too_long:
+                session.too_long(stream.stream_id, self.too_long)
+        if last:
+            stream.fragments = None
+        return 0
+
     def tear(self) -> None:
         """Messages are missing now: a submessage that has begun is passed over to its end."""
         torn = self.torn or self.too_long > 0 or (len(self.data) > 0 and not self.whole)
@@ -94,12 +95,13 @@ class Cutter:
         """Puts as many pieces into ``stream`` as it has room for; whether the last one is in."""
         total = len(self.data)
         while self.done < total:
-            n = stream.capacity()
+            n = stream.mtu - stream._start - _HEAD
             if n > total - self.done:
                 n = total - self.done
-            at = stream.reserve(n)
+            at = stream.place(n)
             if at < 0:
                 return False
+            stream.commit(at, n)
             buf = stream.buf
             buf[at] = _FRAGMENT
             buf[at + 1] = _LITTLE_ENDIAN if self.done + n < total else _LITTLE_ENDIAN | _LAST_FRAGMENT

@@ -1,14 +1,16 @@
 """The reliable streams of a host with many sessions: messages are bytes, held only while they wait.
 
-Same rules and numbers as in ``outputs``; a session that is idle holds nothing. A sender may be given
+Same rules and numbers as in ``streams``; a session that is idle holds nothing. A sender may be given
 more than its window: the rest waits in order, so that nothing accepted is lost.
 """
 
 from collections import deque
 
 from muros.xrce._types import Send
-from muros.xrce.outputs import Output
-from muros.xrce.session import SessionCore, go_on
+from muros.xrce.mending import go_on
+from muros.xrce.outputs import begin, reset
+from muros.xrce.session import SessionCore
+from muros.xrce.streams import Output
 
 _FRAGMENT = 13
 _LITTLE_ENDIAN = 0x01
@@ -27,7 +29,7 @@ class QueuedBestEffortOutput(Output):
     """Sends each submessage at once, in a message of its own."""
 
     def __init__(self, stream_id: int, mtu: int, head: bytearray) -> None:
-        super().__init__(stream_id, 0, head)
+        begin(self, stream_id, 0, head)
         self.mtu = mtu
         self._head = head
 
@@ -49,7 +51,7 @@ class QueuedReliableOutput(Output):
     def __init__(self, stream_id: int, mtu: int, head: bytearray, history: int, period: int) -> None:
         self._kept: deque[bytes] | None = None
         self._waiting: deque[bytes] | None = None
-        super().__init__(stream_id, 0, head, history, period)
+        begin(self, stream_id, 0, head, history, period)
         self.mtu = mtu
         self._head = head
 
@@ -75,9 +77,9 @@ class QueuedReliableOutput(Output):
         """Messages behind the window."""
         return len(self._waiting) if self._waiting else 0
 
-    def acknowledge(self, first: int, bitmap: int, send: Send, now: int) -> bool:
+    def acknowledge(self, first: int, send: Send, now: int) -> bool:
         """As in ``Output``; what waits moves into the room that was made."""
-        known = super().acknowledge(first, bitmap, send, now)
+        known = super().acknowledge(first, send, now)
         kept = self._kept
         if kept is not None:
             for _ in range(len(kept) - (self.next - self.first & 0xFFFF)):
@@ -94,7 +96,7 @@ class QueuedReliableOutput(Output):
 
     def reset(self) -> None:
         """Begins again with number 0; every kept or waiting message is dropped."""
-        super().reset()
+        reset(self)
         self._kept = self._waiting = None
 
     def _append(self, submessage: bytes, send: Send, now: int) -> None:
@@ -117,7 +119,8 @@ class QueuedReliableOutput(Output):
         self.next = self.sent = number + 1 & 0xFFFF
         send(message, 0, len(message))
 
-    def _transmit(self, number: int, end: int, send: Send) -> None:
+    def transmit(self, number: int, end: int, send: Send) -> None:
+        """Sends the messages from ``number`` to before ``end``."""
         while number != end and self._kept is not None:
             message = self._kept[-(self.next - number & 0xFFFF)]
             send(message, 0, len(message))

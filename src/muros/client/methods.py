@@ -1,0 +1,153 @@
+"""What programs and entities ask of a session now and then: to make something, to wait for an answer, to end.
+
+Boards borrow this; its functions are methods of ``session.Session``.
+"""
+
+from muros.compat import borrow, const, ticks_ms
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import Any
+
+    from muros.client._types import OnData, Outgoing
+    from muros.client.qos import AnyQos
+    from muros.client.services import OnReply, OnRequest, Replier, Requester
+    from muros.client.session import Entity, Session
+    from muros.xrce._types import Buffer
+    from muros.xrce.streams import Input, Output
+
+_STREAM_BEST_EFFORT = const(0x01)
+_KIND_DATAWRITER = const(5)
+_KIND_DATAREADER = const(6)
+_KIND_REQUESTER = const(7)
+_KIND_REPLIER = const(8)
+_TOO_LONG = const(4)
+_PROBLEM_UNREACHABLE = const(9)
+_PROBLEM_LARGEST = const(10)
+_INDICES = const(4096)
+
+
+def participant(self: "Session", name: str, domain: int = 0) -> "Entity":
+    """A DDS participant, the node of ROS. ValueError for a name longer than 59 characters, or for no domain."""
+    made: "Entity" = borrow("muros.client.making").participant(self, name, domain)
+    return made
+
+
+def writer(self: "Session", node: "Entity", topic: str, kind: str, qos: "AnyQos" = "default") -> "Entity":
+    """A writer of ``topic`` with messages of a type, named as in ROS or in DDS. ``publish(message)`` sends."""
+    made: "Entity" = borrow("muros.client.making").endpoint(
+        self, node, topic, kind, qos, _KIND_DATAWRITER, None
+    )
+    return made
+
+
+def reader(
+    self: "Session",
+    node: "Entity",
+    topic: str,
+    kind: str,
+    qos: "AnyQos" = "default",
+    on_data: "OnData | None" = None,
+) -> "Entity":
+    """A reader of ``topic``; ``on_data(buf, off, n)`` gets each sample, whose bytes are only lent."""
+    made: "Entity" = borrow("muros.client.making").endpoint(
+        self, node, topic, kind, qos, _KIND_DATAREADER, on_data
+    )
+    return made
+
+
+def requester(
+    self: "Session", node: "Entity", name: str, kind: str, on_reply: "OnReply", qos: "AnyQos" = "services"
+) -> "Requester":
+    """A client of the service ``name``; ``on_reply(number, buf, off, n)`` gets replies, see ``services``."""
+    from muros.client.services import Requester
+
+    made = Requester(on_reply)
+    borrow("muros.client.making").service(made, self, node, name, kind, _KIND_REQUESTER, qos)
+    return made
+
+
+def replier(
+    self: "Session", node: "Entity", name: str, kind: str, on_request: "OnRequest", qos: "AnyQos" = "services"
+) -> "Replier":
+    """A server of the service ``name``; ``on_request(identity, buf, off, n)`` gets requests, see ``services``."""
+    from muros.client.services import Replier
+
+    made = Replier(on_request)
+    borrow("muros.client.making").service(made, self, node, name, kind, _KIND_REPLIER, qos)
+    return made
+
+
+def ping(self: "Session", timeout: int = 1000, clock: "Callable[[], int]" = ticks_ms) -> bool:
+    """Asks the agent, within the session: whether it answers within ``timeout`` ms and knows us."""
+    answered: bool = borrow("muros.client.echo").ask(self, timeout, clock)
+    return answered
+
+
+def close(self: "Session") -> None:
+    """Takes leave of the agent, for at most one second, and closes the transport."""
+    borrow("muros.client.closing").close(self)
+
+
+def output(self: "Session", reliable: int) -> "Output":
+    """The stream to write to; the one for best effort is made at the first need."""
+    if not reliable and _STREAM_BEST_EFFORT not in self.outputs:
+        self.outputs[_STREAM_BEST_EFFORT] = borrow("muros.xrce.outputs").make(
+            _STREAM_BEST_EFFORT, self.mtu, self.head
+        )
+    stream: "Output" = self.reliable if reliable else self.outputs[_STREAM_BEST_EFFORT]
+    return stream
+
+
+def make_input(self: "Session", stream_id: int) -> "Input | None":
+    """The stream for best effort is made when something comes on it; there are no others."""
+    if stream_id != _STREAM_BEST_EFFORT:
+        return None
+    made: "Input" = borrow("muros.xrce.inputs").make(stream_id)
+    self.inputs[stream_id] = made
+    return made
+
+
+def index(self: "Session", kind: int) -> int:
+    """A new index for an object of a kind. ValueError after the last; hosts use those of deleted objects again."""
+    index = self.counts[kind]
+    if index == _INDICES:
+        raise ValueError("no room for one more: a session has at most 4096 objects of a kind")
+    self.counts[kind] = index + 1
+    return index
+
+
+def defer(self: "Session", writer: "Any", message: "Outgoing", n: int) -> bool:
+    """What becomes of a sample that cannot go out now: it is queued, cut up, or refused and counted."""
+    taken: bool = borrow("muros.client.requests").keep(self).defer(writer, message, n)
+    return taken
+
+
+def too_long(self: "Session", stream_id: int, n: int) -> None:
+    """A sample that came was larger than ``largest``."""
+    borrow("muros.client.backlog").dropped(self, _TOO_LONG, _PROBLEM_LARGEST, n)
+
+
+def problem(self: "Session", code: int, value: int = 0, what: "object" = "") -> None:
+    """Tells ``on_problem``."""
+    try:
+        if self.on_problem is not None:
+            borrow("muros.client.problems").tell(self, code, value, what)
+    except Exception as error:
+        self.raised = error
+
+
+def stranger(self: "Session", buf: "Buffer", at: int) -> None:
+    """The agent acknowledges what was never sent."""
+    self.lead().stranger(self, buf, at)
+
+
+def gone(self: "Session", error: OSError) -> None:
+    """There is no way to the agent any more."""
+    self.up = False
+    self.problem(_PROBLEM_UNREACHABLE, 0, error)
+
+
+def attempting(self: "Session", now: int) -> None:
+    """An attempt to reach the agent is made; hosts have more to say about it."""

@@ -1,0 +1,48 @@
+"""Requests of a session, in its reliable stream. Boards borrow this."""
+
+from muros.compat import borrow, const
+from muros.xrce.create import head
+from muros.xrce.outputs import reserve
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from muros.client.backlog import Backlog
+    from muros.client.session import Session
+
+_FIRST_REQUEST = const(10)
+
+
+def requests(self: "Session", count: int) -> int:
+    """The first of ``count`` request ids in a row."""
+    first = self.request
+    if first + count > 0xFFFF:
+        first = _FIRST_REQUEST
+    self.request = first + count
+    return first
+
+
+def submit(
+    self: "Session", kind: int, flags: int, request: int, object_id: int, payload: "bytes | bytearray"
+) -> bool:
+    """Puts a submessage with ids into the reliable stream; False when there is no room now."""
+    n = 4 + len(payload)
+    stream = self.reliable
+    backlog = self.backlog
+    at = -1 if backlog is not None and backlog.cutter is not None else reserve(stream, n)
+    if at < 0:
+        if n <= stream.mtu - stream._start - 4:
+            return False
+        data = bytearray(4 + n)
+        head(data, 0, kind, flags, n, request, object_id)
+        data[8:] = payload
+        return keep(self).first(data)
+    head(stream.buf, at, kind, flags, n, request, object_id)
+    stream.buf[at + 8 : at + 4 + n] = payload
+    return True
+
+
+def keep(self: "Session") -> "Backlog":
+    """The backlog, made at the first need."""
+    if self.backlog is None:
+        self.backlog = borrow("muros.client.backlog").Backlog(self)
+    return self.backlog

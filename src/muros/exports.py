@@ -1,0 +1,48 @@
+"""Where the public names of ``muros.client`` and ``muros.rclc`` are, so that a board loads only what its program needs.
+
+Boards borrow this, and with it the modules with a star.
+"""
+
+from muros.compat import MPY, borrow
+
+_PLACES = """
+client.custom Custom
+*client.discovery discover
+*client.link WAITING CONNECTING CONNECTED LOST
+*client.presence ping
+*client.qos Qos
+client.serial Serial
+client.session Session
+client.tcp Tcp
+client.timesync TimeSync
+client.uart Uart
+client.udp Udp
+rclc.client Client
+rclc.context Context Node
+rclc.errors CapacityError InvalidNameError RclError
+rclc.executor Executor
+rclc.guard GuardCondition
+rclc.middleware register
+rclc.service Service
+rclc.subscription Subscription
+rclc.timer Timer
+rclc.triggers all_of any_of one
+"""
+_ON_HOSTS = """
+client.hosts Session
+rclc.hosts Client Context Executor Node Service Subscription
+"""
+
+
+def find(package: str, name: str) -> object:
+    """What a package calls ``name``; AttributeError for what is not there."""
+    for line in (_PLACES if MPY else _ON_HOSTS + _PLACES).strip().split("\n"):
+        words = line.split()
+        if name not in words:
+            continue
+        place = words[0].strip("*")
+        if place.split(".")[0] == package or name == "Qos":
+            if words[0] != place:
+                return getattr(borrow("muros." + place), name)
+            return getattr(__import__("muros." + place, None, None, (name,)), name)
+    raise AttributeError(name)

@@ -1,0 +1,155 @@
+"""What mends streams: messages that come early, holes, repetitions, submessages that have to wait. See ``streams``.
+
+A reliable receiver handles messages in order and keeps those that came early, within its window; ``missing`` is the
+bitmap of its ACKNACK. Memory is taken for messages that came early only, and while they wait: on most lines none does.
+The answer to a hole repeats with every message that arrives behind it, so a message that was sent again is not sent
+once more within ``_HOLD_OFF`` ms.
+
+A board borrows this when the first message is lost, and keeps it for as long as its session lasts: where one is lost
+there will be more.
+"""
+
+from muros.compat import const, ticks_diff
+from muros.xrce.session import submessages, tell
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from muros.xrce._types import Buffer, Send
+    from muros.xrce.session import SessionCore
+    from muros.xrce.streams import Input, Output
+
+_ACKNACK = const(10)
+_LITTLE_ENDIAN = const(0x01)
+_BITS = const(16)
+_DONE = const(-1)
+_HOLD_OFF = const(20)
+
+
+def take(session: "SessionCore", stream: "Input", number: int, buf: "Buffer", off: int, n: int) -> None:
+    """Takes a message of a reliable stream that is not simply the next one."""
+    if accept(stream, number, buf, off, n):
+        go_on(session, stream, buf, off, n)
+    else:
+        acknowledge(session, stream)
+
+
+def go_on(session: "SessionCore", stream: "Input", buf: "Buffer", off: int, n: int) -> None:
+    """Handles what is in order now and acknowledges: first the expected message, which is the one that is kept or
+    else ``buf[off:off + n]``, then those kept behind it. What a submessage sets off may lead back here; the outer
+    call goes on then."""
+    if not stream.busy:
+        stream.busy = True
+        try:
+            while True:
+                number = stream.expected
+                if number in stream.early:
+                    buf = stream.early[number]
+                    off = 0
+                    n = len(buf)
+                elif n == 0:
+                    break
+                at = submessages(session, buf, off + (stream.resume_at or len(session.head)), off + n, stream)
+                if not stream.busy:
+                    break  # a submessage has reset the streams: number 0 comes next
+                if stream.expected == number:  # no HEARTBEAT in the message gave it up
+                    if at != _DONE:
+                        keep(stream, number, buf, off, n)
+                        stream.resume_at = at - off
+                        break
+                    advance(stream, 1)
+                n = 0
+        finally:
+            stream.busy = False
+    acknowledge(session, stream)
+
+
+def hold(session: "SessionCore", stream: "Input", buf: "Buffer", off: int, n: int, at: int) -> None:
+    """Keeps the expected message, to be gone on with behind its first ``at`` bytes."""
+    keep(stream, stream.expected, buf, off, n)
+    stream.resume_at = at
+    acknowledge(session, stream)
+
+
+def acknowledge(session: "SessionCore", stream: "Input") -> None:
+    """Says what is expected and what is missing."""
+    bitmap = missing(stream)
+    tell(session, _ACKNACK, stream.stream_id, stream.expected, bitmap >> 8 | (bitmap & 255) << 8)
+
+
+def heartbeat(session: "SessionCore", stream: "Input", buf: "Buffer", at: int) -> None:
+    """Takes a HEARTBEAT about a reliable stream."""
+    flags = buf[at - 3] & _LITTLE_ENDIAN  # tells which of the two bytes comes first
+    announce(
+        stream,
+        buf[at + flags] << 8 | buf[at + 1 - flags],
+        buf[at + 2 + flags] << 8 | buf[at + 3 - flags],
+    )
+    go_on(session, stream, buf, 0, 0)
+
+
+def accept(stream: "Input", number: int, buf: "Buffer", off: int, n: int) -> bool:
+    """Whether a message is to be handled now. One that came early is kept, others are dropped."""
+    ahead = number - stream.expected & 0xFFFF
+    if ahead >= stream.window:
+        return False
+    if ahead >= stream.known:
+        stream.known = ahead + 1
+    if ahead:
+        keep(stream, number, buf, off, n)
+    return ahead == 0
+
+
+def keep(stream: "Input", number: int, buf: "Buffer", off: int, n: int) -> None:
+    """Keeps a message that came early, or is held; what is longer than the MTU or the heap is sent again."""
+    if n <= stream.mtu and number not in stream.early:
+        try:
+            stream.early[number] = bytes(memoryview(buf)[off : off + n])
+        except MemoryError:
+            pass
+
+
+def advance(stream: "Input", count: int) -> None:
+    """The next ``count`` messages are handled or given up."""
+    stream.expected = stream.expected + count & 0xFFFF
+    stream.known = max(stream.known - count, 0)
+    stream.resume_at = 0
+    if stream.early:
+        for number in list(stream.early):
+            if number - stream.expected & 0x8000:
+                del stream.early[number]
+
+
+def announce(stream: "Input", first: int, last: int) -> None:
+    """The peer keeps the messages ``first`` to ``last`` and has given up what came before."""
+    count = first - stream.expected & 0xFFFF
+    if 0 < count < 0x8000:
+        advance(stream, count)
+        if stream.fragments is not None:
+            stream.fragments.tear()
+    count = last + 1 - stream.expected & 0xFFFF
+    if stream.known < count < 0x8000:
+        stream.known = count
+
+
+def missing(stream: "Input") -> int:
+    """The bitmap of an ACKNACK: bit i set when ``expected + i`` is known to exist and not here."""
+    bitmap = (1 << min(stream.known, _BITS)) - 1
+    for number in stream.early:
+        bitmap &= ~(1 << (number - stream.expected & 0xFFFF))
+    return bitmap
+
+
+def resend(stream: "Output", bitmap: int, send: "Send", now: int) -> None:
+    """Sends again what the ``bitmap`` of an ACKNACK asks for, bit 0 being the first unacknowledged message."""
+    if ticks_diff(now, stream._again_at) >= _HOLD_OFF:
+        stream._again = 0
+    number = stream.first
+    bit = 1
+    while bit <= bitmap and number != stream.sent:
+        if bitmap & bit & ~stream._again:
+            stream._again |= bit
+            stream._again_at = now
+            stream.resends += 1
+            stream.transmit(number, number + 1 & 0xFFFF, send)
+        number = number + 1 & 0xFFFF
+        bit <<= 1
