@@ -57,8 +57,7 @@ class Rig:
 
     def space(self, domain: int, engine: str = "dds", **options: Any) -> Space:
         """Open a space and attach it."""
-        if engine == "dds":
-            options.setdefault("interfaces", ("lo",))
+        options.setdefault("interfaces", ("lo",))
         space = open_space(f"{engine}:{domain}", **options)
         space.findings.on_finding(self.told.append)
         space.attach(self.loop)

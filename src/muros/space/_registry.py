@@ -22,6 +22,7 @@ class EngineFactory(Protocol):
 _ENGINES: Final[dict[str, str | EngineFactory]] = {
     "local": "muros.space.local:open_local",
     "dds": "muros.space.dds:open_dds",
+    "cyclonedds": "muros.space.cyclone:open_cyclone",
 }
 """Engines by name; as text "module:factory" they are imported when first used."""
 
