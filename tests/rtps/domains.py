@@ -78,7 +78,9 @@ class Process:
     def participant(self, **options: Any) -> ParticipantCore:
         """A new participant. Its events are kept in `events` by its prefix."""
         self._made += 1
-        prefix = options.pop("prefix", bytes((self.number, self._made & 0xFF)) + b"prefix%04d" % (self._made >> 8))
+        prefix = options.pop(
+            "prefix", bytes((self.number, self._made & 0xFF)) + b"prefix%04d" % (self._made >> 8)
+        )
         kept = self.events[prefix] = []
         return self.core.participant(prefix, now=self.now, on_event=kept.append, **options)
 

@@ -278,6 +278,22 @@ def test_one_that_came_back_with_the_same_guid_is_met_again() -> None:
     ]
 
 
+def test_one_that_comes_back_is_understood_by_those_who_missed_its_farewell() -> None:
+    world, left, right = pair()
+    listener = right.participant()
+    prefix = b"the same one"
+    for life in range(3):
+        talker = left.participant(prefix=prefix)
+        writer = left.writer(talker, f"rt/{life}", entity=0x103)
+        world.run(2 * SECOND)
+        assert [endpoint.topic for endpoint in listener.endpoints] == [f"rt/{life}"]
+        assert listener.endpoint(writer.guid) == writer.data
+        world.network.loss = 1.0
+        talker.close(left.now)
+        world.run(10 * MS)
+        world.network.loss = 0.0
+
+
 def test_nothing_is_left_behind() -> None:
     world, left, right = pair()
     for _ in range(3):

@@ -1,6 +1,7 @@
 """What others may cost: peers that say too much, too often, or too large things."""
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ from muros.rtps import (
     DomainSettings,
     EndpointData,
     EndpointQos,
+    ParticipantChanged,
     ParticipantCore,
 )
 from muros.rtps._constants import (
@@ -21,7 +23,7 @@ from muros.rtps._constants import (
 )
 from muros.rtps._discovery_data import Assertion
 from muros.rtps._wire import data, heartbeat
-from tests.rtps.domains import MS, SECOND, TYPE, Process, World
+from tests.rtps.domains import MS, SECOND, TYPE, Process, World, of
 from tests.rtps.strangers import Stranger
 
 
@@ -84,6 +86,18 @@ def test_changes_are_limited_in_time_and_heard_later() -> None:
     assert 15 <= len(participant.endpoints) <= 30
     world.run(SECOND)
     assert len(participant.endpoints) == 50
+
+
+def test_one_that_says_something_else_of_itself_all_the_time_is_heard_now_and_then() -> None:
+    world, process, participant, stranger = met()
+    for number in range(200):
+        stranger.told = replace(stranger.told, name=f"{number}")
+        stranger.announce()
+    assert len(of(process.events[participant.prefix], ParticipantChanged)) == 20
+    assert [report.problem for report in process.reports] == [DomainProblem.FLOOD]
+    world.run(SECOND)
+    stranger.announce()
+    assert participant.participants[0].name == "199"
 
 
 def test_nobody_speaks_of_anothers_endpoints() -> None:

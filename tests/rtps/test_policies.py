@@ -21,12 +21,15 @@ from muros.rtps import (
     Ownership,
     ParticipantCore,
     Policy,
+    Problem,
     Received,
     Reliability,
     ResourceLimits,
     StatusInfo,
+    Trouble,
     Unmatched,
     Why,
+    WriterSettings,
     inline_qos,
     related_identity,
 )
@@ -164,6 +167,27 @@ def test_keep_all_refuses_when_full_and_says_when_there_is_room() -> None:
     assert writer.write(payload(9), pair.now) == 5
 
 
+def test_a_reader_is_given_the_writers_patience_from_the_first_refusal_on() -> None:
+    pair = Pair(history=History.KEEP_ALL)
+    pair.writer.close(pair.now)
+    writer = pair.left.writer(
+        pair.talker, qos=pair.writer_qos, settings=WriterSettings(limit=3, patience=SECOND)
+    )
+    pair.run(SECOND)
+    pair.right.vanish()
+    for number in range(3):
+        assert writer.write(payload(number), pair.now)
+        pair.run(SECOND)
+    assert not writer.write(payload(3), pair.now)  # although nothing has been acknowledged for three seconds
+    pair.run(900 * MS)
+    assert not writer.write(payload(3), pair.now)
+    assert pair.left_events(Trouble) == []
+    pair.run(200 * MS)
+    assert writer.write(payload(3), pair.now)
+    (told,) = pair.left_events(Trouble)
+    assert (told.local, told.remote, told.problem) == (writer.guid, pair.reader.guid, Problem.READER_STALLED)
+
+
 def test_a_reader_that_refuses_stops_a_writer_that_keeps_all() -> None:
     pair = Pair(history=History.KEEP_ALL, limits=ResourceLimits(max_samples=10))
     accepted: list[Received] = []
@@ -200,6 +224,34 @@ def test_samples_end_with_their_lifespan() -> None:
     first = pair.got[0]
     assert first.expires is not None
     assert 0 < first.expires - (first.sequence + SECOND + SECOND) < MS  # it came at 1 s, and lives 1 s
+
+
+def test_a_lifespan_counts_from_arrival_also_for_what_was_held_back() -> None:
+    pair = Pair({"lifespan": SECOND}, history=History.KEEP_ALL)
+    expires: list[int | None] = []
+    open_ = [False]
+
+    def on_sample(sample: Received) -> bool:
+        if open_[0]:
+            expires.append(sample.expires)
+        return open_[0]
+
+    reader = pair.right.reader(pair.listener, qos=pair.reader_qos, on_sample=on_sample)
+    pair.run(SECOND)
+    written = []
+    for number in range(3):
+        written.append(pair.now)
+        pair.write(number)
+        pair.run(100 * MS)
+    open_[0] = True
+    reader.resume(pair.now)
+    pair.write(3)
+    written.append(pair.now)
+    pair.run(100 * MS)
+    assert len(expires) == 4
+    for at, end in zip(written, expires, strict=True):
+        assert end is not None
+        assert SECOND <= end - at < SECOND + MS
 
 
 # --- Deadline --------------------------------------------------------------------------------------------

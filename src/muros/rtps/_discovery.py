@@ -218,7 +218,12 @@ class Discovery(Timed):
             self._domain.agenda.at(self, now + RESUME)
             return False
         try:
-            if not sample.payload or sample.key or status_info(sample.inline_qos) & _GONE:
+            inline_qos = sample.inline_qos
+            if (
+                not sample.payload
+                or sample.key
+                or (inline_qos is not None and status_info(inline_qos) & _GONE)
+            ):
                 guid = key_untrusted(sample.payload, sample.inline_qos)
                 if guid in known.endpoints:
                     self._forget(known, guid, Why.LEFT, now)

@@ -3,7 +3,7 @@
 Theory of operation. A datagram is parsed once. Its events are handed to those they are for by two tables: what a
 writer of somebody else says, to the readers of ours that are matched with it; what a reader says, to the writer of
 ours that is named, or, where no participant is named, to those matched with that reader. What nobody is matched with
-is dropped and counted. Announcements of participants are heard here, for all of ours at once.
+is dropped and counted. Announcements of participants are heard once for all of ours (`_others.py`).
 
 Participants of this process know each other without discovery (`_registry.py`), and what they say to each other does
 not leave: it waits in `inside` until the call that caused it has done its work, and so do events for owners, in `news`.
@@ -19,17 +19,16 @@ from dataclasses import replace
 from typing import Any, Final
 
 from muros.rtps._agenda import Agenda
-from muros.rtps._constants import ENTITYID_SPDP_WRITER, PROTOCOL_VERSION, StatusInfo
-from muros.rtps._discovery_data import EndpointData, InvalidDiscoveryData, ParticipantData, key_untrusted
+from muros.rtps._constants import ENTITYID_SPDP_WRITER
+from muros.rtps._discovery_data import EndpointData, InvalidDiscoveryData, ParticipantData
 from muros.rtps._domain_settings import DOMAIN_DEFAULTS, NOWHERE, Addresses, DomainSettings, Transmit
 from muros.rtps._endpoint import MILLISECOND, SECOND, Send
 from muros.rtps._events import AckNack, Data, Event, InfoReply, InvalidMessage, NackFrag
 from muros.rtps._gather import Gather
 from muros.rtps._liveliness import WriterLease
 from muros.rtps._news import DomainProblem, DomainReport, ParticipantEvent, Why
-from muros.rtps._parameters import InvalidParameters, status_info
+from muros.rtps._others import Others
 from muros.rtps._participant import ParticipantCore
-from muros.rtps._peer import Peer
 from muros.rtps._ports import FOR_READERS, ReaderPort, Route, WriterPort
 from muros.rtps._reach import INSIDE, Hosts
 from muros.rtps._registry import Registry
@@ -44,14 +43,8 @@ TELL_AGAIN: Final = 10 * SECOND
 TOLD_MOST: Final = 256
 """Problems remembered as reported."""
 
-OVERTAKEN: Final = 2 * SECOND
-"""For so long an announcement may be on its way that was overtaken by a newer one, or by a farewell."""
-
 LIVES_MOST: Final = 4096
 """Participants of this process remembered that have ended."""
-
-GONE_MOST: Final = 256
-"""Farewells remembered."""
 
 PARSED_MOST: Final = 2048
 """Announcements of endpoints remembered as parsed, since every participant of ours hears them."""
@@ -91,7 +84,8 @@ class DomainCore:
         self.busy = False
         self.hosts = Hosts(addresses)
         self.agenda = Agenda()
-        self.peers: dict[GuidPrefix, Peer] = {}
+        self.others: Final = Others(self)
+        self.peers: Final = self.others.peers
         self.registry = Registry()
         self.inside: deque[bytes] = deque()
         self.news: deque[tuple[Callable[[Any], object], Any]] = deque()
@@ -106,7 +100,6 @@ class DomainCore:
         self._lead: ParticipantCore | None = None
         self._number = 0
         self._lives: dict[GuidPrefix, tuple[int, ...]] = {}
-        self._gone: dict[GuidPrefix, tuple[int, int]] = {}
         self._parsed: dict[bytes, EndpointData] = {}
         self._told: dict[tuple[DomainProblem, GuidPrefix], int] = {}
 
@@ -121,6 +114,10 @@ class DomainCore:
     def participants(self) -> tuple[ParticipantCore, ...]:
         """Those of this process."""
         return tuple(self._participants.values())
+
+    def find(self, prefix: GuidPrefix) -> ParticipantCore | None:
+        """The one of this process with this prefix."""
+        return self._participants.get(prefix)
 
     def participant(
         self,
@@ -147,7 +144,7 @@ class DomainCore:
             raise ValueError(f"GUID prefix {prefix.hex()} is in use")
         self.now = now
         if prefix in self.peers:
-            self._lose(self.peers[prefix], Why.LEFT, now)  # an earlier life of it, elsewhere
+            self.others.lose(self.peers[prefix], Why.LEFT, now)  # an earlier life of it, elsewhere
         data = self._addressed(
             ParticipantData(
                 prefix=prefix,
@@ -183,10 +180,7 @@ class DomainCore:
         self.now = now
         self.addresses = addresses
         self.hosts = Hosts(addresses)
-        for peer in self.peers.values():
-            self._locate(peer)
-            for participant in self._participants.values():
-                participant.update(peer, None, now)
+        self.others.relocate(now)
         for participant in self._participants.values():
             participant.readdress(self._addressed(participant.data), now)
         self.finish()
@@ -326,12 +320,12 @@ class DomainCore:
         """This writer of somebody else is matched with a reader of ours."""
         route = self._route(writer)
         if port not in route.ports:
-            route.ports = (*route.ports, port)
+            route.set((*route.ports, port))
 
     def remove_route(self, writer: Guid, port: ReaderPort) -> None:
         """They are not matched any more."""
         route = self._route(writer)
-        route.ports = tuple(other for other in route.ports if other is not port)
+        route.set(tuple(other for other in route.ports if other is not port))
         self._tidy(writer, route)
 
     def add_lease(self, lease: WriterLease) -> None:
@@ -423,15 +417,13 @@ class DomainCore:
                 route = routes.get((said_by, event.writer))
                 if route is None:
                     if event.writer == ENTITYID_SPDP_WRITER and kind is Data and outside:
-                        self._announced(event, source, now)
+                        self.others.announced(event, source, now)
                     else:
                         self.counters["unmatched"] += 1
                     continue
                 destination, reader = event.destination, event.reader
-                for port in route.ports:
-                    if (reader == 0 or reader == port.entity) and (
-                        destination is None or destination == port.prefix
-                    ):
+                for port in route.ports if destination is None else route.of(destination):
+                    if reader == 0 or reader == port.entity:
                         core = port.core
                         handle(core, event, now)
                         if core.due < port.wake_at:
@@ -505,100 +497,7 @@ class DomainCore:
             source,
         )
 
-    # --- Participants of others --------------------------------------------------------------------------
-
-    def _announced(self, event: Data, source: Locator | None, now: int) -> None:
-        """A participant says something of itself (8.5.3)."""
-        prefix = event.source
-        peer = self.peers.get(prefix)
-        if peer is not None and event.payload == peer.payload and event.payload:
-            return
-        number, at = (peer.sequence, peer.told) if peer is not None else self._gone.get(prefix, (0, 0))
-        if event.sequence < number and now - at < OVERTAKEN:
-            return
-        if event.destination is not None and event.destination not in self._participants:
-            self.counters["unmatched"] += 1
-            return
-        try:
-            if not event.payload or event.key or status_info(event.inline_qos) & ~StatusInfo.FILTERED:
-                self._departed(key_untrusted(event.payload, event.inline_qos), event, now)
-                return
-            data = ParticipantData.parse_untrusted(event.payload)
-        except (InvalidDiscoveryData, InvalidParameters) as error:
-            self.refuse(DomainProblem.DISCOVERY_MALFORMED, prefix if peer else b"", str(error))
-            return
-        if data.prefix != prefix:
-            self.refuse(DomainProblem.PREFIX_MISMATCH, prefix if peer else b"", data.prefix.hex())
-        elif not self._is_of_this_domain(data, source):
-            self.counters["foreign"] += 1
-        elif peer is not None:
-            self._update(peer, data, event, source, now)
-        elif len(self.peers) >= self.settings.peers:
-            self.refuse(DomainProblem.TOO_MANY_PEERS, b"", prefix.hex(), self.settings.peers)
-        else:
-            self._meet(data, event, source, now)
-
-    def _is_of_this_domain(self, data: ParticipantData, source: Locator | None) -> bool:
-        if data.domain in (None, self.domain) and data.domain_tag == self.settings.domain_tag:
-            return data.version[0] == PROTOCOL_VERSION[0]
-        number = -1 if data.domain is None else data.domain
-        self.report(DomainProblem.FOREIGN_DOMAIN, b"", number, data.domain_tag, source)
-        return False
-
-    def _meet(self, data: ParticipantData, event: Data, source: Locator | None, now: int) -> None:
-        peer = Peer(data, event.payload, source, now, self._silent)
-        peer.sequence = event.sequence
-        peer.lease = max(peer.lease, self.settings.lease_least)
-        self._locate(peer)
-        self.peers[peer.prefix] = peer
-        self.agenda.at(peer, now + peer.lease)
-        for participant in self._participants.values():
-            participant.meet(peer, now)
-
-    def _update(
-        self, peer: Peer, data: ParticipantData, event: Data, source: Locator | None, now: int
-    ) -> None:
-        before, peer.data, peer.payload, peer.source = peer.data, data, event.payload, source
-        peer.sequence, peer.told = event.sequence, now
-        peer.lease = max(data.lease, self.settings.lease_least)
-        self._locate(peer)
-        self.agenda.at(peer, now + peer.lease)
-        for participant in self._participants.values():
-            participant.update(peer, before if before != data else None, now)
-
-    def _locate(self, peer: Peer) -> None:
-        peer.locate(self.hosts)
-        if not peer.discovery or not peer.user:
-            data = peer.data
-            offered = data.metatraffic_unicast + data.default_unicast
-            self.report(
-                DomainProblem.UNREACHABLE,
-                peer.prefix,
-                len(offered),
-                ", ".join(map(str, offered)),
-                peer.source,
-            )
-
-    def _departed(self, guid: Guid, event: Data, now: int) -> None:
-        prefix = event.source
-        peer = self.peers.get(prefix)
-        if guid[:PREFIX_SIZE] != prefix:
-            self.refuse(DomainProblem.PREFIX_MISMATCH, prefix if peer else b"", guid.hex())
-        elif peer is not None:
-            self._gone.pop(prefix, None)
-            if len(self._gone) >= GONE_MOST:
-                del self._gone[next(iter(self._gone))]
-            self._gone[prefix] = event.sequence, now
-            self._lose(peer, Why.LEFT, now)
-
-    def _silent(self, peer: Peer, now: int) -> None:
-        self._lose(peer, Why.LEASE, now)
-
-    def _lose(self, peer: Peer, why: Why, now: int) -> None:
-        del self.peers[peer.prefix]
-        self.agenda.forget(peer)
-        for participant in self._participants.values():
-            participant.part(peer, why, now)
+    # --- Helpers -----------------------------------------------------------------------------------------
 
     def _choose_lead(self, now: int) -> None:
         """The participant that has been here longest announces itself to those not known yet."""
@@ -607,8 +506,6 @@ class DomainCore:
             self._lead = lead
             if lead is not None:
                 lead.lead(now)
-
-    # --- Helpers -----------------------------------------------------------------------------------------
 
     def _addressed(self, data: ParticipantData) -> ParticipantData:
         """With the addresses of this process."""

@@ -79,11 +79,9 @@ class Mismatch:
 
 @dataclass(frozen=True, slots=True)
 class ParticipantFound:
-    """Somebody is there."""
+    """Somebody in another process is there. Of those in this process nothing is told: they are known anyway."""
 
     participant: ParticipantData
-    local: bool = False
-    """Whether it lives in this process."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +102,7 @@ class ParticipantLost:
 
 @dataclass(frozen=True, slots=True)
 class EndpointFound:
-    """A writer or reader of somebody else is there."""
+    """A writer or reader in another process is there."""
 
     endpoint: EndpointData
 

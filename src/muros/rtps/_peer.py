@@ -19,18 +19,9 @@ class Peer(Timed):
     """
 
     __slots__ = (
-        "_on_silence",
-        "data",
-        "discovery",
-        "lease",
-        "local",
-        "payload",
-        "seen",
-        "sequence",
-        "source",
-        "told",
+        "_on_silence", "budget", "data", "discovery", "lease", "payload", "seen", "sequence", "source", "told",
         "user",
-    )
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -38,6 +29,7 @@ class Peer(Timed):
         payload: bytes,
         source: Locator | None,
         now: int,
+        budget: "Budget",
         on_silence: Callable[["Peer", int], object],
     ) -> None:
         super().__init__()
@@ -52,6 +44,8 @@ class Peer(Timed):
         """... and when it came."""
         self.seen = now
         """When something came from it."""
+        self.budget = budget
+        """How often it may say something else of itself."""
         self.lease = data.lease
         self.discovery: tuple[Locator, ...] = ()
         """Where discovery is sent."""

@@ -11,7 +11,7 @@ from muros.rtps._agenda import Timed
 from muros.rtps._events import Data, DataFrag, Gap, Heartbeat, HeartbeatFrag
 from muros.rtps._liveliness import WriterLease
 from muros.rtps._reader import ReaderCore
-from muros.rtps._values import split_guid
+from muros.rtps._values import GuidPrefix, split_guid
 from muros.rtps._writer import WriterCore
 
 __all__ = ["FOR_READERS", "ReaderPort", "Route", "WriterPort"]
@@ -50,12 +50,27 @@ class ReaderPort(Timed):
 class Route:
     """Who wants the samples of one writer of somebody else. The tuples are replaced, never changed."""
 
-    __slots__ = ("leases", "ports")
+    __slots__ = ("_by_prefix", "leases", "ports")
 
     def __init__(self) -> None:
         self.ports: tuple[ReaderPort, ...] = ()
+        self._by_prefix: dict[GuidPrefix, tuple[ReaderPort, ...]] | None = None
         self.leases: tuple[WriterLease, ...] = ()
         """Those who watch whether the writer is alive."""
+
+    def set(self, ports: tuple[ReaderPort, ...]) -> None:
+        """These want its samples from now on."""
+        self.ports = ports
+        self._by_prefix = None
+
+    def of(self, prefix: GuidPrefix) -> tuple[ReaderPort, ...]:
+        """Those of them that belong to the participant `prefix`."""
+        if self._by_prefix is None:
+            groups: dict[GuidPrefix, list[ReaderPort]] = {}
+            for port in self.ports:
+                groups.setdefault(port.prefix, []).append(port)
+            self._by_prefix = {prefix: tuple(group) for prefix, group in groups.items()}
+        return self._by_prefix.get(prefix, ())
 
 
 FOR_READERS: Final[dict[type, Callable[[ReaderCore, Any, int], None]]] = {
