@@ -1,14 +1,14 @@
-"""CDR for boards: sequences of numbers and of strings; see :mod:`muros.cdr` and :mod:`muros.cdr_texts`.
+"""CDR for boards: sequences; see :mod:`muros.cdr` and :mod:`muros.cdr_texts`.
 
-A ``code`` is one of ``struct`` and ``array``; ``B`` stands for bytes, ``s`` for strings and,
-in reading, ``?`` for bools.
+A ``code`` is one of ``struct`` and ``array``; ``B`` stands for bytes, ``s`` for strings and, in reading,
+``?`` for bools.
 """
 
 from array import array
 from struct import calcsize, pack_into
 
-from muros.cdr import block
-from muros.cdr_texts import count, pad, part, put_count, put_text, text, text_size
+from muros.cdr import block, need
+from muros.cdr_texts import count, pad, part, put_text, text, text_size
 from muros.compat import const
 
 TYPE_CHECKING = const(0)
@@ -36,15 +36,22 @@ def put_sequence(
 ) -> int:
     """Writes a sequence; returns the offset behind it. Allocates unless it is of bytes."""
     n = len(values)
-    p = put_count(buf, p, off, n, bound)
+    if bound:
+        need(bound, n)
+    while p - off & 3:
+        buf[p] = 0
+        p += 1
+    pack_into("<I", buf, p, n)
+    p += 4
+    if not n:
+        return p
     if code == "s":
         for value in values:
             p = put_text(buf, p, off, value)
         return p
-    if not n:
-        return p
     size = calcsize(code)
-    p = pad(buf, p, off, size)
+    if p - off & size - 1:
+        p = pad(buf, p, off, size)
     end = p + n * size
     values = block(values, code, n)
     if code == "B":
@@ -54,12 +61,20 @@ def put_sequence(
     return end
 
 
-def sequence_size(p: int, values: "Sequence[Any]", code: str) -> int:
-    """The size of a message up to and with a sequence, ``p`` without it."""
-    if code != "s":
-        size = calcsize(code)
-        return list_size(p, values, size, size)
-    p = list_size(p, values, 1, 0)
+def put_count(buf: "bytearray", p: int, off: int, n: int, bound: int = 0) -> int:
+    """Writes the count of a sequence; returns the offset behind it. Raises CdrError beyond the bound."""
+    if bound:
+        need(bound, n)
+    while p - off & 3:
+        buf[p] = 0
+        p += 1
+    pack_into("<I", buf, p, n)
+    return p + 4
+
+
+def texts_size(p: int, values: "Sequence[str | bytes | bytearray]") -> int:
+    """The size of a message up to and with a sequence of strings, ``p`` without it."""
+    p = (p + 3 & -4) + 4
     for value in values:
         p = text_size(p, value)
     return p

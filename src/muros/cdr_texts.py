@@ -19,7 +19,8 @@ def part(at: "list[Any]", align: int, size: int) -> int:
     """The offset of the next ``size`` bytes, which begin at a multiple of ``align``; the position is behind them."""
     p: int = at[3]
     p += at[1] - p & align - 1
-    need(at[2] - p, size)
+    if at[2] - p < size:
+        need(at[2] - p, size)
     at[3] = p + size
     return p
 
@@ -39,39 +40,42 @@ def count(at: "list[Any]", least: int, bound: int = 0) -> int:
     n = integer(at[0], part(at, 4, 4), 4, 0)
     if bound:
         need(bound, n)
-    need(at[2] - at[3], n * least)
+    if at[2] - at[3] < n * least:
+        need(at[2] - at[3], n * least)
     return n
 
 
 def text(at: "list[Any]", bound: int = 0) -> str:
     """The next string. Allocates the string and a view."""
     n = count(at, 1, bound and bound + 1)
+    p: int = at[3]
+    at[3] = end = p + n
     if n == 0:
         return ""
-    p = part(at, 1, n)
     try:
-        if at[0][at[3] - 1] == 0:
-            return str(memoryview(at[0])[p : p + n - 1], "utf-8")
+        if at[0][end - 1] == 0:
+            return str(memoryview(at[0])[p : end - 1], "utf-8")
     except ValueError:
         pass
     raise CdrError("bad string")
 
 
-def encoded(value: "str | bytes | bytearray", memo: "list[Any] | None", i: int) -> "bytes | bytearray":
-    """The bytes of a string; a str is encoded once and kept in ``memo``, from ``i`` on, until it is replaced."""
-    if not isinstance(value, str):
-        return value
-    if memo is None:
-        return value.encode()
-    if value is not memo[i]:
-        memo[i + 1] = value.encode()
+def encoded(value: str, memo: "list[Any] | None", i: int) -> bytes:
+    """The bytes of a string, which ``memo`` keeps from ``i`` on until another takes its place."""
+    data = value.encode()
+    if memo:
         memo[i] = value
-    return memo[i + 1]  # type: ignore[no-any-return]
+        memo[i + 1] = data
+    return data
 
 
 def text_size(p: int, value: "str | bytes | bytearray", memo: "list[Any] | None" = None, i: int = 0) -> int:
     """The size of a message up to and with a string, ``p`` without it."""
-    return (p + 3 & -4) + 5 + len(encoded(value, memo, i))
+    if memo and value is memo[i]:
+        value = memo[i + 1]
+    elif isinstance(value, str):
+        value = encoded(value, memo, i)
+    return (p + 3 & -4) + 5 + len(value)
 
 
 def put_text(
@@ -84,23 +88,22 @@ def put_text(
     bound: int = 0,
 ) -> int:
     """Writes a string: its count, its bytes, NUL; returns the offset behind it."""
-    value = encoded(value, memo, i)
+    if memo and value is memo[i]:
+        value = memo[i + 1]
+    elif isinstance(value, str):
+        value = encoded(value, memo, i)
     n = len(value)
     if bound:
         need(bound, n)
-    p = put_count(buf, p, off, n + 1)
-    buf[p : p + n] = value
-    buf[p + n] = 0
-    return p + n + 1
-
-
-def put_count(buf: "bytearray", p: int, off: int, n: int, bound: int = 0) -> int:
-    """Writes the count of a string or sequence; returns the offset behind it. Raises CdrError beyond the bound."""
-    if bound:
-        need(bound, n)
-    p = pad(buf, p, off, 4)
-    pack_into("<I", buf, p, n)
-    return p + 4
+    while p - off & 3:
+        buf[p] = 0
+        p += 1
+    pack_into("<I", buf, p, n + 1)
+    p += 4
+    buf[p : p + n] = value  # type: ignore[assignment]  # no str any more
+    p += n
+    buf[p] = 0
+    return p + 1
 
 
 def pad(buf: "bytearray", p: int, off: int, align: int) -> int:

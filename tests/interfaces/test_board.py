@@ -332,7 +332,7 @@ def test_cdr_itself_is_small() -> None:
     require("mpy-cross")
     assert _least_cost("import muros.cdr", "import muros.compat\n") <= 1000
     assert _least_cost("import muros.cdr_texts", "import muros.cdr\n") <= 1500
-    assert _least_cost("import muros.cdr_lists", "import muros.cdr_texts\n") <= 1100
+    assert _least_cost("import muros.cdr_lists", "import muros.cdr_texts\n") <= 1300
 
 
 def _least_cost(imported: str, before: str) -> int:

@@ -227,10 +227,9 @@ class _Sizer(_Placed):
                 memo = _memo_arguments(self.code, leaf, self._memo)
                 self._moved(f"text_size({self._position()}, {value}{memo})")
             case Numbers():
-                code = _bytewise(leaf.code)
-                self._moved(f'sequence_size({self._position()}, {self.code.place(leaf.path)}, "{code}")')
+                self._elements(leaf, leaf.size, leaf.size)
             case Many() if _is_texts(leaf):
-                self._moved(f'sequence_size({self._position()}, {self.code.place(leaf.path)}, "s")')
+                self._moved(f"texts_size({self._position()}, {self.code.place(leaf.path)})")
             case Many():
                 self._many(leaf)
             case Group():
@@ -238,15 +237,24 @@ class _Sizer(_Placed):
                 self._moved(f"{function}({self.code.place(leaf.path)}, {self._position()})")
 
     def _many(self, leaf: Many) -> None:
-        items = self.code.place(leaf.path)
         stride = None if leaf.count else _stride(leaf.body)
         if stride:
-            self._moved(f"list_size({self._position()}, {items}, {stride[0]}, {stride[1]})")
+            self._elements(leaf, *stride)
             return
+        items = self.code.place(leaf.path)
         if not leaf.count:
             self._skip(4, 4)
             self._at = self._at.aligned(4).moved(4)
         self._loop(leaf, items, "size", "p")
+
+    def _elements(self, leaf: Numbers | Many, align: int, size: int) -> None:
+        """A sequence of elements that are ``size`` bytes each."""
+        items = self.code.place(leaf.path)
+        if self._at.aligned(4).moved(4).pad(align) == 0:
+            self._skip(4, 4)
+            self._base, self._const = f"{self._position()} + {_times(size, f'len({items})')}", 0
+        else:
+            self._moved(f"list_size({self._position()}, {items}, {align}, {size})")
 
     def _skip(self, align: int, size: int) -> None:
         pad = self._at.pad(align)
@@ -487,6 +495,10 @@ class _Reader(_Runs):
         else:
             self.code.line(f"part(at, 1, {len(self._run)})")
             self._run = []
+
+
+def _times(size: int, count: str) -> str:
+    return count if size == 1 else f"{size} * {count}"
 
 
 def _bytewise(code: str) -> str:

@@ -36,18 +36,8 @@ from muros.interfaces._registry import Registry
 
 _HELPERS = {
     "muros.cdr": ("Fields", "block", "ended", "integer", "need", "numbers"),
-    "muros.cdr_texts": (
-        "count",
-        "finish",
-        "pad",
-        "part",
-        "put_count",
-        "put_text",
-        "text",
-        "text_size",
-        "unpack",
-    ),
-    "muros.cdr_lists": ("list_size", "put_sequence", "sequence", "sequence_size"),
+    "muros.cdr_texts": ("count", "finish", "pad", "part", "put_text", "text", "text_size", "unpack"),
+    "muros.cdr_lists": ("list_size", "put_count", "put_sequence", "sequence", "texts_size"),
 }
 
 MOST_CONSTANTS = 500  # bytes of a 32-bit heap: names, each with what its entry takes
