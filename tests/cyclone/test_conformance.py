@@ -3,6 +3,8 @@
 Among the participants of one process Cyclone delivers within the call, so time can be a test's here too.
 """
 
+from pathlib import Path
+
 import pytest
 
 from muros.findings import Finding
@@ -160,3 +162,37 @@ class TestCyclone(VirtualTime):
             got += take_all(reader)
             other.tick()
             assert [*got, *take_all(reader)] == [numbered(n) for n in range(sent + 1)]
+
+
+def test_every_gap_is_documented() -> None:
+    text = (Path(__file__).parents[2] / "docs/cyclonedds.md").read_text()
+    assert [gap for gap in GAPS if f"| {gap} |" not in text] == []
+
+
+def test_what_makes_no_sense_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(SpaceError, match="'x' is no domain number"):
+        open_space("cyclonedds:x")
+    with pytest.raises(TypeError, match="has no option speed"):
+        open_space("cyclonedds:", speed=3)
+    with pytest.raises(SpaceError, match="'BOTH' is not possible"):
+        open_space("cyclonedds:", range="BOTH")
+    with (
+        open_space("cyclonedds:3", config="<CycloneDDS><Nonsense/>") as space,
+        pytest.raises(SpaceError, match="does not take the configuration of domain 3"),
+    ):
+        space.participant("node")
+    monkeypatch.setattr("muros.space.cyclone._space.installed_version", lambda: "")
+    with pytest.raises(SpaceError, match=r"pip install 'cyclonedds==11\.0\.1'.*dds: needs nothing"):
+        open_space("cyclonedds:")
+
+
+def test_another_version_is_used_as_it_is_and_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("muros.space.cyclone._opaque.installed_version", lambda: "12.0.0")
+    with open_space("cyclonedds:1", range="OFF") as space:
+        node = space.participant("node")
+        writer, reader = node.writer(CHATTER, RELIABLE), node.reader(CHATTER, RELIABLE)
+        writer.write(b"x\0\0\0")
+        assert take_all(reader) == [b"x\0\0\0"]
+        (finding,) = space.findings.snapshot()
+        assert finding.code == "types-announced"
+        assert "Kilted" in finding.what
