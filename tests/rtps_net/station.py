@@ -92,7 +92,7 @@ class Station:
         return made
 
     def _on_event(self, event: ParticipantEvent) -> None:
-        if isinstance(event, ParticipantFound) and not event.local:
+        if isinstance(event, ParticipantFound):
             self.here.append(event.participant.name)
         elif isinstance(event, ParticipantLost):
             self.here.remove(event.participant.name)
