@@ -70,6 +70,10 @@ def test_what_a_peer_says_is_limited_in_size() -> None:
         stranger.endpoint(number << 8 | 3, user_data=bytes(3000))
     assert len(participant.endpoints) == 3
     assert [report.problem for report in process.reports] == [DomainProblem.DISCOVERY_TOO_LARGE]
+    for _ in range(5):
+        stranger.withdraw(participant.endpoints[-1])
+        stranger.endpoint(0x7703, user_data=bytes(3000))  # in its place
+    assert len(participant.endpoints) == 3
     for _ in range(20):
         stranger.endpoint(3, user_data=bytes(10))  # what is said anew counts once
         stranger.endpoint(3, user_data=bytes(20))

@@ -532,6 +532,23 @@ def test_a_sample_for_one_reader_reaches_no_other(size: int, reliability: Reliab
         pair.writer.write(payload(1), pair.now, to=bytes(16))
 
 
+@pytest.mark.parametrize("size", [16, 200_000])
+def test_samples_for_one_reader_reach_it_and_no_other_when_many_are_lost(size: int) -> None:
+    pair = Pair(history=History.KEEP_ALL, durability=Durability.TRANSIENT_LOCAL)
+    others = [pair.right.reader(pair.right.participant(), qos=pair.reader_qos) for _ in range(2)]
+    pair.run(SECOND)
+    pair.world.network.loss = 0.3
+    readers = [pair.reader, *others]
+    for number in range(30):
+        pair.writer.write(payload(number, size), pair.now, to=readers[number % 3].guid)
+        pair.run(5 * MS)
+    pair.run(20 * SECOND)
+    for index, reader in enumerate(readers):
+        got = [sample.payload for sample in pair.right.got[reader.guid]]
+        assert got == [payload(number, size) for number in range(index, 30, 3)]
+    assert pair.writer.acknowledged
+
+
 # --- What users may do while they take a sample ------------------------------------------------------------
 
 

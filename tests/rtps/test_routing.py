@@ -1,5 +1,6 @@
 """What a peer says reaches those it is for, and is taken for what it is; a peer made of bytes says it."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from muros.rtps import (
     Incompatible,
     Liveliness,
     LivelinessChanged,
+    ParticipantChanged,
     ParticipantCore,
     ParticipantLost,
     Reliability,
@@ -21,6 +23,7 @@ from muros.rtps import (
 from muros.rtps._constants import (
     ENTITYID_PARTICIPANT_MESSAGE_WRITER,
     ENTITYID_SEDP_PUBLICATIONS_READER,
+    ENTITYID_SEDP_PUBLICATIONS_WRITER,
     ENTITYID_SEDP_SUBSCRIPTIONS_READER,
     ENTITYID_SPDP_READER,
     ENTITYID_SPDP_WRITER,
@@ -107,6 +110,12 @@ def test_answers_go_where_info_reply_says_for_the_rest_of_its_message() -> None:
     assert sent[0].receiver == elsewhere
     assert {datagram.receiver for datagram in sent[1:]} == {stranger.at}
     sent.clear()
+    publications = ENTITYID_SEDP_PUBLICATIONS_WRITER
+    stranger.send(info_reply([elsewhere]), heartbeat(0, publications, 1, 5, 1))
+    stranger.send(heartbeat(0, publications, 1, 5, 2))
+    world.run(100 * MS)
+    assert [datagram.receiver for datagram in sent[:2]] == [elsewhere, stranger.at]
+    sent.clear()
     stranger.send(info_reply([udp4("239.255.0.7", 4444)]), heartbeat(0, 0x103, 1, 6, 3))
     assert [datagram.receiver for datagram in sent] == [stranger.at]
 
@@ -148,6 +157,38 @@ def test_what_was_overtaken_by_a_farewell_is_left_alone_for_a_while() -> None:
     world.run(3 * SECOND)
     stranger.announce()  # one that counts anew
     assert len(participant.participants) == 1
+
+
+def test_what_was_overtaken_by_a_newer_announcement_is_left_alone() -> None:
+    world, process, participant, stranger = met()
+    old, stranger.told = stranger.told, replace(stranger.told, name="new")
+    stranger.announced = 10
+    stranger.announce()
+    stranger.told, stranger.announced = old, 5
+    stranger.announce()
+    assert [found.name for found in participant.participants] == ["new"]
+    world.run(3 * SECOND)
+    stranger.announce()
+    assert [found.name for found in participant.participants] == [""]
+    assert len(of(process.events[participant.prefix], ParticipantChanged)) == 2
+
+
+def test_a_change_is_told_several_times() -> None:
+    world, process, participant, stranger = met(lease=1000 * SECOND)
+    world.run(2 * SECOND)
+    second = process.participant()
+    world.run(2 * SECOND)
+    sent = world.record()
+    second.set_user_data(b"new", process.now)
+    world.run(1500 * MS)
+    told = [
+        event
+        for event in stranger.heard(sent)
+        if isinstance(event, Data) and event.source == second.prefix and b"new" in event.payload
+    ]
+    assert len(told) == 5
+    assert second.data.user_data == b"new"
+    assert participant.data.user_data == b""
 
 
 def test_a_changed_lease_counts() -> None:

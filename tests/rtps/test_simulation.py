@@ -199,12 +199,9 @@ def test_nothing_is_left_behind_when_all_have_gone(seed: int) -> None:
     town.world.run(30 * SECOND)
     for process in town.processes:
         core = process.core
-        assert not (core.peers)
-        assert not (core._routes)
-        assert not (core._writers)
-        assert not (core._replies)
-        assert not (core.inside)
-        assert not (core.news)
+        assert len(core.registry) == len(core.registry._topics) == len(core.gathered) == 0
+        tables = (core._routes, core._writers, core._replies, core.peers, core.inside, core.news)
+        assert not any(tables)
         assert core.deadline is None
     town.world.network.counters.clear()
     town.world.run(60 * SECOND)
