@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final, NamedTuple, TypeVar
 
+from muros._kinds import Durability, History, Liveliness, Ownership, Reliability
 from muros.rtps._constants import Pid
 from muros.rtps._parameters import InvalidParameters, ParameterBuilder, Parameters
 from muros.rtps._values import INFINITE, duration_from_wire, duration_to_wire
@@ -44,44 +45,6 @@ XCDR2: Final = 2
 
 MAX_REPRESENTATIONS: Final = 8
 """Data representations read from an endpoint; there are three."""
-
-
-class Reliability(IntEnum):
-    """Whether samples may be lost."""
-
-    BEST_EFFORT = 1
-    RELIABLE = 2
-
-
-class Durability(IntEnum):
-    """What a late reader gets of what was written before."""
-
-    VOLATILE = 0
-    TRANSIENT_LOCAL = 1
-    TRANSIENT = 2
-    PERSISTENT = 3
-
-
-class History(IntEnum):
-    """What is kept when samples come faster than they go."""
-
-    KEEP_LAST = 0
-    KEEP_ALL = 1
-
-
-class Liveliness(IntEnum):
-    """Who says that a writer is alive."""
-
-    AUTOMATIC = 0
-    MANUAL_BY_PARTICIPANT = 1
-    MANUAL_BY_TOPIC = 2
-
-
-class Ownership(IntEnum):
-    """Whether several writers may update the same data."""
-
-    SHARED = 0
-    EXCLUSIVE = 1
 
 
 class DestinationOrder(IntEnum):

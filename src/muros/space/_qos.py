@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Final, NamedTuple
 
-from muros.rtps import Durability, History, Liveliness, Ownership, Reliability
+from muros._kinds import Durability, History, Liveliness, Ownership, Reliability
 
 __all__ = [
     "PRESETS",
