@@ -96,7 +96,8 @@ def test_we_see_the_nodes_of_ros_and_what_they_have(
     rig.until(lambda: writer_of_chatter() is None, "the publisher to go")
     ros.do("reset")
     rig.until(lambda: [node.full_name for node in graph.nodes] == ["/onlooker"], "the node to go")
-    assert {endpoint.participant.full_name for endpoint in graph.writers} <= {"/onlooker"}
+    rig.until(lambda: graph.writers == (), "all that it wrote to go")
+    rig.until(lambda: len(graph.participants) == 1, "its participant to go")
 
 
 @pytest.mark.parametrize("distro", ROS)
