@@ -1,7 +1,7 @@
 """Engine `cyclonedds`: the ROS 2 graph by way of Eclipse Cyclone DDS, with the package cyclonedds from PyPI.
 
-An alternative to the engine `dds`, for who wants a second opinion or Cyclone's speed with many readers. Everything
-passes as bytes here too. What Cyclone cannot do, and `dds` can, is told in `GAPS`.
+An alternative to the engine `dds`, for who wants a second opinion. Everything passes as bytes here too. What Cyclone
+cannot do, and `dds` can, is told in `GAPS`.
 """
 
 from typing import Final
