@@ -34,6 +34,16 @@ rclc.hosts Client Context Executor Node Service Subscription
 """
 
 
+def names(package: str) -> "list[str]":
+    """All public names of a package that hosts have."""
+    found = {"Qos"}
+    for line in _PLACES.strip().split("\n"):
+        words = line.split()
+        if words[0].strip("*").split(".")[0] == package:
+            found.update(words[1:])
+    return sorted(found - {"Uart"})
+
+
 def find(package: str, name: str) -> object:
     """What a package calls ``name``; AttributeError for what is not there."""
     for line in (_PLACES if MPY else _ON_HOSTS + _PLACES).strip().split("\n"):

@@ -128,7 +128,7 @@ def test_the_indices_of_deleted_objects_are_used_again_once_they_are_deleted() -
     assert unused(session) == held.id >> 4
     for _ in range(5):
         again = session.writer(device.participant, "rt/again", STRING)
-        assert (again.id, again.topic) == (held.id, held.topic)
+        assert (again.id, again.above) == (held.id, held.above)
         world.run(50)
         assert again.write_bytes(b"here")
         again.destroy()

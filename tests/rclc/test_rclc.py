@@ -76,7 +76,7 @@ def test_names_on_the_wire_are_those_of_ros() -> None:
     node = board.context.node("thermometer", namespace="greenhouse")
     writer: Any = node.publisher(Int32, "temperature")
     assert (writer.name, writer.type_name) == ("rt/greenhouse/temperature", "std_msgs/msg/Int32")
-    assert writer.parent == node.participant.id
+    assert writer.above & 0xFFF == node.participant.id >> 4
     assert node.participant.name == "/greenhouse/thermometer"
     assert b"std_msgs::msg::dds_::Int32_\0" in variant(writer, 0)
     absolute: Any = node.publisher(Int32, "/temperature", qos="sensor_data")

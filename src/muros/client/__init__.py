@@ -24,21 +24,7 @@ if TYPE_CHECKING:
     from muros.client.udp import Udp as Udp
 
 if not MPY:
-    __all__ = [
-        "CONNECTED",
-        "CONNECTING",
-        "LOST",
-        "WAITING",
-        "Custom",
-        "Qos",
-        "Serial",
-        "Session",
-        "Tcp",
-        "TimeSync",
-        "Udp",
-        "discover",
-        "ping",
-    ]
+    __all__ = borrow("muros.exports").names("client")
 
 
 def __getattr__(name: str) -> object:

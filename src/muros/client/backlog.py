@@ -6,11 +6,9 @@ can be sent again whole. When a session begins anew, ``hold`` takes over every W
 acknowledged (DDS-XRCE 1.0, 8.4.10 to 8.4.14). Boards borrow this for as long as there is a backlog.
 """
 
-from muros.client.link import CONNECTED
-from muros.client.requests import requests
 from muros.compat import const
-from muros.xrce.create import head
 from muros.xrce.fragments import Cutter
+from muros.xrce.outputs import head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -20,6 +18,7 @@ if TYPE_CHECKING:
     from muros.client.session import Session
     from muros.xrce._types import Buffer
 
+_CONNECTED = const(2)
 _DELETE = const(3)
 _WRITE_DATA = const(7)
 _FRAGMENT = const(13)
@@ -48,7 +47,7 @@ class Backlog:
         """Sends a sample of ``n`` bytes if it can go out now, else queues it, or counts and reports it."""
         session = self.session
         stream = writer.stream
-        ready = session.state == CONNECTED and writer.todo == 0
+        ready = session.state == _CONNECTED and writer.todo == 0
         if writer.status or (not ready and not (stream.reliable and session.queue)):
             return self._refuse(_OFFLINE, _PROBLEM_OFFLINE, writer, n)
         large = n + _HEAD > stream.mtu - stream._start - _HEAD
@@ -92,7 +91,7 @@ class Backlog:
         while items:
             data = items[0]
             if self.cutter is None:
-                if data[0] == _WRITE_DATA and (session.state != CONNECTED or session.pending):
+                if data[0] == _WRITE_DATA and (session.state != _CONNECTED or session.pending):
                     break
                 n = len(data) - _HEAD
                 if n > stream.mtu - stream._start - _HEAD:
@@ -148,17 +147,9 @@ class Backlog:
         self._cut = None
 
     def _write(self, buf: bytearray, at: int, writer: "Any", message: "Outgoing", n: int) -> None:
-        head(buf, at, _WRITE_DATA, _LITTLE_ENDIAN, n + _HEAD, requests(self.session, 1), writer.id)
+        head(buf, at, _WRITE_DATA, _LITTLE_ENDIAN, n + _HEAD, self.session.number(), writer.id)
         message.write(buf, at + 2 * _HEAD)
 
     def _refuse(self, cause: int, code: int, writer: "Any", n: int) -> bool:
-        dropped(self.session, cause, code, n, writer)
+        self.session.dropped(cause, code, n, writer)
         return False
-
-
-def dropped(session: "Any", cause: int, code: int, n: int, what: "object" = "") -> None:
-    """Counts a sample of ``n`` bytes in the session's ``drops``, and tells ``on_problem``."""
-    count = session.drops[cause] + 1
-    session.drops[cause] = count
-    if count & count - 1 == 0:  # the 1st, 2nd, 4th, 8th...: never a flood
-        session.problem(code, n, what)

@@ -1,16 +1,14 @@
-"""The ends: entities are destroyed, sessions take leave of their agent. Boards borrow this."""
+"""The end of a session: it takes leave of its agent. Boards borrow this."""
 
-from muros.client.entities import object_id, steps
 from muros.client.link import WAITING, enter
-from muros.client.requests import keep, requests
 from muros.compat import const
-from muros.xrce.create import head
+from muros.xrce.outputs import head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
 
-    from muros.client.session import Entity, Session
+    from muros.client.session import Session
     from muros.xrce._types import Buffer
 
 _DELETE = const(3)
@@ -18,33 +16,8 @@ _LITTLE_ENDIAN = const(0x01)
 _OBJECT_CLIENT = const(0xFFFE)
 _REQUEST_LOGOUT = const(2)
 _CONTROL = const(8)
-_STEPS = const(0x0F)
-_ASKED = const(4)
-_REFUSED = const(0x100)
 _ATTEMPTS = const(10)
 _PATIENCE = const(100)  # ms for each attempt
-
-
-def destroy(entity: "Entity") -> None:
-    """Forgets an entity and has the agent delete its objects, after what was written before; waits for nothing."""
-    session = entity.session
-    if entity not in session.entities:
-        return
-    session.entities.remove(entity)
-    count = steps(entity)
-    if entity.todo & _STEPS:
-        session.pending -= 1
-    for step in range(count):
-        if entity.todo >> step + _ASKED & 1:
-            session.waiting -= 1
-    entity.todo = _REFUSED
-    entity.status = 1
-    session.objects.pop(entity.id, None)
-    backlog = keep(session)
-    for step in (0, 2, 1) if count == 3 else (0,):
-        data = bytearray(8)
-        head(data, 0, _DELETE, _LITTLE_ENDIAN, 4, requests(session, 1), object_id(entity, step))
-        backlog.items.append(data)
 
 
 def leave(session: "Session") -> None:

@@ -24,10 +24,10 @@ _LITTLE_ENDIAN = const(0x01)
 _CREATE_FLAGS = const(0x07)  # little endian, REUSE and REPLACE
 _KIND_PARTICIPANT = const(1)
 _KIND_DATAWRITER = const(5)
+_PARENT_BITS = const(12)
 _QOS_RELIABLE = const(0x01)
 _STREAM_BEST_EFFORT = const(0x01)
 _STREAM_RELIABLE = const(0x80)
-_OBJECT_CLIENT = const(0xFFFE)
 _ERROR = const(0x80)
 _AT_ONCE = const(8)  # requests in flight: an agent with 16 unacknowledged messages loses a STATUS
 _STEPS = const(0x0F)  # the bits of ``todo``: steps without a good STATUS, requests under way, refused
@@ -75,9 +75,6 @@ def work(session: "Session", now: int) -> None:
 
 def status(session: "Session", request: int, object_id: int, status: int) -> None:
     """Takes a STATUS."""
-    if object_id == _OBJECT_CLIENT:
-        session.login = True  # the agent has taken our leave
-        return
     for entity in session.entities:
         if _answered(session, entity, request - entity.request, object_id, status):
             return
@@ -146,7 +143,9 @@ def variant(entity: "Entity", step: int) -> bytes:
     made: bytes
     if kind == _KIND_PARTICIPANT:
         made = create.participant(entity.name, entity.domain)
-    elif steps(entity) == 1:
+        return made
+    parent = (entity.above & (1 << _PARENT_BITS) - 1) << 4 | _KIND_PARTICIPANT
+    if steps(entity) == 1:
         made = create.service(
             kind,
             entity.name,
@@ -154,15 +153,20 @@ def variant(entity: "Entity", step: int) -> bytes:
             dds_type(entity.type_name, "_Response"),
             topic_name("rq", entity.name, "Request"),
             topic_name("rr", entity.name, "Reply"),
-            entity.parent,
+            parent,
         )
     elif step == 0:
-        made = create.topic(entity.name, dds_type(entity.type_name), entity.parent)
+        made = create.topic(entity.name, dds_type(entity.type_name), parent)
     elif step == 1:
-        made = create.group(kind - 2, entity.parent)
+        made = create.group(kind - 2, parent)
     else:
         made = create.endpoint(
-            kind, entity.topic, entity.qos, entity.id - 2, entity.name, dds_type(entity.type_name)
+            kind,
+            entity.above >> _PARENT_BITS,
+            entity.qos,
+            entity.id - 2,
+            entity.name,
+            dds_type(entity.type_name),
         )
     return made
 

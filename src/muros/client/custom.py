@@ -5,6 +5,7 @@ from muros.compat import const, sleep_ms
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from typing import Any
 
     from muros.client._types import Deliver
     from muros.xrce._types import Buffer
@@ -36,11 +37,11 @@ class Custom:
         wait: "Callable[[int], object] | None" = None,
     ) -> None:
         self.mtu = mtu
-        self._close = close
+        self.open: "Any" = open
+        self.close: "Any" = close
+        self.wait: "Any" = wait or _nap
         self._write = write
-        self._open = open
         self._read = read
-        self._wait = wait
         self._rx = bytearray(mtu)
         self._deliver: "Deliver | None" = None
         self._taken = 0
@@ -51,14 +52,6 @@ class Custom:
 
             self.deframer = SerialDeframer(source, mtu, self._on_frame)
             self._write = SerialFramer(source, destination, lambda buf, n: write(buf, 0, n)).send
-
-    def open(self) -> bool:
-        """Opens the way."""
-        return bool(self._open())
-
-    def close(self) -> None:
-        """Closes the way."""
-        self._close()
 
     def send(self, buf: "Buffer", off: int, n: int) -> None:
         """Sends a message."""
@@ -85,14 +78,12 @@ class Custom:
                 self.deframer.feed(rx, n)
         return self._taken
 
-    def wait(self, timeout: int) -> None:
-        """Waits as the ``wait`` that was given does, or for a millisecond."""
-        if self._wait is not None:
-            self._wait(timeout)
-        else:
-            sleep_ms(1)
-
     def _on_frame(self, buf: bytearray, off: int, n: int, source: int) -> None:
         self._taken += 1
         if self._deliver is not None:
             self._deliver(buf, off, n)
+
+
+def _nap(timeout: int) -> None:
+    """Waits for a millisecond."""
+    sleep_ms(1)

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 _KIND_DATAWRITER = const(5)
 _KIND_DATAREADER = const(6)
+_PARENT_BITS = const(12)
 
 UNLIMITED = const(0xFFFF)
 
@@ -27,12 +28,12 @@ def object_id(self: "Entity", step: int) -> int:
     """The id of an object: ``index << 4 | kind``."""
     if step == steps(self) - 1:
         return self.id
-    return self.id - 2 if step else self.topic
+    return self.id - 2 if step else self.above >> _PARENT_BITS
 
 
 def destroy(self: "Entity") -> None:
     """Has the agent delete the objects; the entity is not to be used any more."""
-    borrow("muros.client.closing").destroy(self)
+    borrow("muros.client.deleting").destroy(self)
 
 
 def write_bytes(self: "Entity", data: "bytes | bytearray") -> bool:

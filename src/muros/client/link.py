@@ -50,6 +50,7 @@ _STATUS = const(5)
 _INFO = const(6)
 _LITTLE_ENDIAN = const(0x01)
 _OBJECT_AGENT = const(0xFFFD)
+_OBJECT_CLIENT = const(0xFFFE)
 _STREAM_RELIABLE = const(0x80)
 _CONTROL = const(8)
 _SOON = const(250)  # ms between attempts while an agent is expected back
@@ -129,7 +130,9 @@ def enter(session: "Session", state: int) -> None:
 def answer(session: "Session", kind: int, buf: "Buffer", off: int, n: int) -> None:
     """Takes a submessage that has to do with the connection."""
     if kind == _STATUS:
-        if n >= 6:
+        if n >= 6 and buf[off + 2] << 8 | buf[off + 3] == _OBJECT_CLIENT:
+            session.login = True  # the agent has taken our leave
+        elif n >= 6 and session.waiting:
             borrow("muros.client.creating").status(
                 session, buf[off] << 8 | buf[off + 1], buf[off + 2] << 8 | buf[off + 3], buf[off + 4]
             )
@@ -190,7 +193,7 @@ def _is_due(session: "Session", now: int, again: int) -> bool:
     session._due = ticks_add(now, again)
     if not session.up:
         try:
-            session.up = session.transport.open()
+            session.up = bool(session.transport.open())
         except OSError as error:
             session.problem(_PROBLEM_UNREACHABLE, 0, error)
             return False

@@ -16,6 +16,7 @@ _KIND_TOPIC = const(2)
 _KIND_DATAREADER = const(6)
 _LAST_DOMAIN = const(255)  # which leaves the choice to the agent; the others end at 232
 _QOS_RELIABLE = const(0x01)
+_PARENT_BITS = const(12)
 
 
 def participant(session: "Session", name: str, domain: int) -> "Entity":
@@ -42,11 +43,11 @@ def endpoint(
     made = _made(Entity(), session, name, kind)
     made.type_name = type_name
     made.qos = wanted
-    made.topic = topic
-    made.parent = node.id
+    made.above = topic << _PARENT_BITS | node.id >> 4
     if kind == _KIND_DATAREADER:
-        made.deliver = on_data
-        session.objects[made.id] = made
+        session.objects[made.id] = on_data if hasattr(on_data, "deliver") else made
+        if session.objects[made.id] is made:
+            made.deliver = on_data
     else:
         made.stream = session.output(wanted.flags & _QOS_RELIABLE)
     return made
@@ -68,7 +69,7 @@ def service(
     _made(made, session, name, kind)
     made.type_name = type_name
     made.qos = wanted
-    made.parent = node.id
+    made.above = node.id >> 4
     made.stream = session.output(wanted.flags & _QOS_RELIABLE)
     session.objects[made.id] = made
 

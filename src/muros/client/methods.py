@@ -22,7 +22,10 @@ _KIND_DATAWRITER = const(5)
 _KIND_DATAREADER = const(6)
 _KIND_REQUESTER = const(7)
 _KIND_REPLIER = const(8)
+_CONNECTED = const(2)
+_OFFLINE = const(0)
 _TOO_LONG = const(4)
+_PROBLEM_OFFLINE = const(7)
 _PROBLEM_UNREACHABLE = const(9)
 _PROBLEM_LARGEST = const(10)
 _INDICES = const(4096)
@@ -50,7 +53,10 @@ def reader(
     qos: "AnyQos" = "default",
     on_data: "OnData | None" = None,
 ) -> "Entity":
-    """A reader of ``topic``; ``on_data(buf, off, n)`` gets each sample, whose bytes are only lent."""
+    """A reader of ``topic``; ``on_data(buf, off, n)`` gets each sample, whose bytes are only lent.
+
+    An object that has a method ``deliver`` may stand in place of the function.
+    """
     made: "Entity" = borrow("muros.client.making").endpoint(
         self, node, topic, kind, qos, _KIND_DATAREADER, on_data
     )
@@ -120,13 +126,24 @@ def index(self: "Session", kind: int) -> int:
 
 def defer(self: "Session", writer: "Any", message: "Outgoing", n: int) -> bool:
     """What becomes of a sample that cannot go out now: it is queued, cut up, or refused and counted."""
+    if self.queue == 0 and (self.state != _CONNECTED or writer.todo):
+        dropped(self, _OFFLINE, _PROBLEM_OFFLINE, n, writer)
+        return False
     taken: bool = borrow("muros.client.requests").keep(self).defer(writer, message, n)
     return taken
 
 
+def dropped(self: "Session", cause: int, code: int, n: int, what: "object" = "") -> None:
+    """Counts a sample of ``n`` bytes in ``drops``, and tells ``on_problem``."""
+    count = self.drops[cause] + 1
+    self.drops[cause] = count
+    if count & count - 1 == 0:  # the 1st, 2nd, 4th, 8th...: never a flood
+        self.problem(code, n, what)
+
+
 def too_long(self: "Session", stream_id: int, n: int) -> None:
     """A sample that came was larger than ``largest``."""
-    borrow("muros.client.backlog").dropped(self, _TOO_LONG, _PROBLEM_LARGEST, n)
+    dropped(self, _TOO_LONG, _PROBLEM_LARGEST, n)
 
 
 def problem(self: "Session", code: int, value: int = 0, what: "object" = "") -> None:

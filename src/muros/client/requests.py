@@ -1,8 +1,7 @@
 """Requests of a session, in its reliable stream. Boards borrow this."""
 
 from muros.compat import borrow, const
-from muros.xrce.create import head
-from muros.xrce.outputs import reserve
+from muros.xrce.outputs import head, reserve
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:

@@ -104,6 +104,7 @@ class Session(SessionCore):
         index = methods.index
         make_input = methods.make_input
         too_long = methods.too_long
+        dropped = methods.dropped
         problem = methods.problem
         stranger = methods.stranger
         defer = methods.defer
@@ -256,8 +257,7 @@ class Entity:
         request: int  # the id of the first request, one more for each step
         type_name: str
         qos: "Qos"
-        topic: int  # the topic's id
-        parent: int  # the participant's id
+        above: int  # the topic's id << 12 | the participant's index
         domain: int
         stream: "Output"  # a writer's
         deliver: "OnData | None"  # a reader's, a service's

@@ -32,24 +32,7 @@ if TYPE_CHECKING:
     from muros.rclc.triggers import one as one
 
 if not MPY:
-    __all__ = [
-        "CapacityError",
-        "Client",
-        "Context",
-        "Executor",
-        "GuardCondition",
-        "InvalidNameError",
-        "Node",
-        "Qos",
-        "RclError",
-        "Service",
-        "Subscription",
-        "Timer",
-        "all_of",
-        "any_of",
-        "one",
-        "register",
-    ]
+    __all__ = borrow("muros.exports").names("rclc")
 
 
 def __getattr__(name: str) -> object:

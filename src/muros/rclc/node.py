@@ -53,9 +53,8 @@ def subscription(
     from muros.rclc.subscription import Subscription
 
     made = Subscription(self.context, kind, callback)
-    made.entity = self.context.middleware.reader(
-        self.participant, self._topic(topic), kind.TYPE, qos, made.deliver
-    )
+    taker: "Any" = made  # a session calls its ``deliver``, which saves the heap a bound method
+    made.entity = self.context.middleware.reader(self.participant, self._topic(topic), kind.TYPE, qos, taker)
     self.entities.append(made)
     return made
 

@@ -8,11 +8,14 @@ package gathers no names:
 module                runs on    holds
 ====================  =========  =======================================================================
 ``constants``         hosts      the wire constants of the specification, by name
-``outputs``           both       best-effort and reliable streams, as sender
-``inputs``            both       best-effort and reliable streams, as receiver
-``queues``            hosts      the same for hosts with many sessions
+``streams``           both       best-effort and reliable streams, as long as no message is lost
+``outputs``           both       streams as sender: made, asked
+``inputs``            both       streams as receiver: made, begun again
+``mending``           both       what is done about messages that come early or not at all
+``queues``            hosts      streams of hosts with many sessions
 ``fragments``         both       joining and cutting samples that are larger than a message
 ``session``           both       a session: headers, streams, acknowledgements; either role
+``beginning``         both       a session when it is made and begins again
 ``create``            both       CREATE and READ_DATA payloads, as a client writes them
 ``entities``          hosts      what a client asks for, as values
 ``representation``    hosts      the same payloads, as an agent reads them from foreign bytes

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _ACKNACK = const(10)
 _LITTLE_ENDIAN = const(0x01)
+_STREAM_RELIABLE = const(0x80)
 _BITS = const(16)
 _DONE = const(-1)
 _HOLD_OFF = const(20)
@@ -76,8 +77,15 @@ def acknowledge(session: "SessionCore", stream: "Input") -> None:
     tell(session, _ACKNACK, stream.stream_id, stream.expected, bitmap >> 8 | (bitmap & 255) << 8)
 
 
-def heartbeat(session: "SessionCore", stream: "Input", buf: "Buffer", at: int) -> None:
-    """Takes a HEARTBEAT about a reliable stream."""
+def heartbeat(session: "SessionCore", buf: "Buffer", at: int) -> None:
+    """Takes a HEARTBEAT."""
+    stream_id = buf[at + 4]
+    if stream_id < _STREAM_RELIABLE:
+        tell(session, _ACKNACK, stream_id, 0, 0)
+        return
+    stream = session.inputs.get(stream_id) or session.make_input(stream_id)
+    if stream is None:
+        return
     flags = buf[at - 3] & _LITTLE_ENDIAN  # tells which of the two bytes comes first
     announce(
         stream,

@@ -27,7 +27,6 @@ _WRITE_DATA = const(7)
 _DATA = const(9)
 _LITTLE_ENDIAN = const(0x01)
 _LAST_FRAGMENT = const(0x02)
-_STREAM_RELIABLE = const(0x80)
 _LATER = const(2)
 _HEAD = const(4)
 _CONTROL = const(8)  # where the submessage of a control message lies in its buffer, behind the longest header
@@ -218,17 +217,14 @@ def _other(session: SessionCore, buf: "Buffer", pos: int, n: int, stream: "Any")
 
 
 def _on_heartbeat(session: SessionCore, buf: "Buffer", at: int) -> None:
-    stream_id = buf[at + 4]
-    if stream_id < _STREAM_RELIABLE:
-        tell(session, _ACKNACK, stream_id, 0, 0)
-        return
-    stream = session.inputs.get(stream_id) or session.make_input(stream_id)
-    if stream is not None:
-        if (
-            buf[at - 3] & 1
-            and not stream.known
-            and buf[at + 2] | buf[at + 3] << 8 == stream.expected - 1 & 0xFFFF
-        ):
-            tell(session, _ACKNACK, stream_id, stream.expected, 0)  # it asks about what is here
-        else:
-            session.mend().heartbeat(session, stream, buf, at)
+    stream = session.inputs.get(buf[at + 4])
+    if (
+        stream
+        and stream.reliable
+        and not stream.known
+        and buf[at - 3] & _LITTLE_ENDIAN
+        and buf[at + 2] | buf[at + 3] << 8 == stream.expected - 1 & 0xFFFF
+    ):
+        tell(session, _ACKNACK, stream.stream_id, stream.expected, 0)  # it asks about what is here
+    else:
+        session.mend().heartbeat(session, buf, at)

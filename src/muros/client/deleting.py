@@ -1,0 +1,38 @@
+"""The end of an entity. Boards borrow this."""
+
+from muros.client.entities import object_id, steps
+from muros.client.requests import keep, requests
+from muros.compat import const
+from muros.xrce.outputs import head
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from muros.client.session import Entity
+
+_DELETE = const(3)
+_LITTLE_ENDIAN = const(0x01)
+_STEPS = const(0x0F)
+_ASKED = const(4)
+_REFUSED = const(0x100)
+
+
+def destroy(entity: "Entity") -> None:
+    """Forgets an entity and has the agent delete its objects, after what was written before; waits for nothing."""
+    session = entity.session
+    if entity not in session.entities:
+        return
+    session.entities.remove(entity)
+    count = steps(entity)
+    if entity.todo & _STEPS:
+        session.pending -= 1
+    for step in range(count):
+        if entity.todo >> step + _ASKED & 1:
+            session.waiting -= 1
+    entity.todo = _REFUSED
+    entity.status = 1
+    session.objects.pop(entity.id, None)
+    backlog = keep(session)
+    for step in (0, 2, 1) if count == 3 else (0,):
+        data = bytearray(8)
+        head(data, 0, _DELETE, _LITTLE_ENDIAN, 4, requests(session, 1), object_id(entity, step))
+        backlog.items.append(data)
