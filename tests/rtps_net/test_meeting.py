@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 from muros.rtps.net import NetworkSettings, Range
-from tests.dds.domains import free_domain
 from tests.rtps_net import namespaces
+from tests.rtps_net.quiet import quiet_domain
 from tests.rtps_net.station import Process, Station, exchange, until, write_all
 
 SIZES = [12] * 300 + [60_000, 70_000, 200_000, 2_000_000, 12]
@@ -17,7 +17,7 @@ SIZES = [12] * 300 + [60_000, 70_000, 200_000, 2_000_000, 12]
 
 @pytest.fixture
 def settings() -> Iterator[NetworkSettings]:
-    with free_domain() as domain:
+    with quiet_domain() as domain:
         yield NetworkSettings(domain, interfaces=("lo",))
 
 

@@ -14,8 +14,8 @@ from muros.findings import Findings
 from muros.rtps import Addresses, Ports, udp4
 from muros.rtps._domain_settings import NOWHERE
 from muros.rtps.net import Interface, Network, NetworkError, NetworkSettings, Range, _network, _outlets
-from tests.dds.domains import free_domain
 from tests.rtps_net.cores import NotingCore, install
+from tests.rtps_net.quiet import quiet_domain
 
 LO = Interface("lo", 1, ("127.0.0.1",), loopback=True, multicast=True)
 ETH = Interface("eth0", 2, ("10.0.0.1", "10.0.0.2"), loopback=False, multicast=True)
@@ -34,7 +34,7 @@ def noting(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.fixture
 def settings() -> Iterator[NetworkSettings]:
-    with free_domain() as domain:
+    with quiet_domain() as domain:
         yield NetworkSettings(domain, interfaces=("lo",))
 
 

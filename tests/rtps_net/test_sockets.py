@@ -19,7 +19,7 @@ from muros.rtps.net._sockets import (
     multicast_sender,
     overflown,
 )
-from tests.dds.domains import free_domain
+from tests.rtps_net.quiet import quiet_domain
 
 LO = Interface("lo", socket.if_nametoindex("lo"), ("127.0.0.1",), loopback=True, multicast=True)
 GROUP = "239.255.0.1"
@@ -27,7 +27,7 @@ GROUP = "239.255.0.1"
 
 @pytest.fixture
 def ports() -> Iterator[Ports]:
-    with free_domain() as domain:
+    with quiet_domain() as domain:
         yield Ports(domain)
 
 
