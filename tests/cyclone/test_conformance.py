@@ -11,7 +11,9 @@ from muros.findings import Finding
 from muros.space import CDR_BE, Qos, Reader, Space, SpaceError, Topic, identity_of, open_space
 from muros.space.cyclone import GAPS
 from muros.space.dds._dialects import client_id, header
+from tests.dds.domains import Domain
 from tests.dds.peers import require
+from tests.dds.rig import Rig
 from tests.space.conformance import (
     ADD,
     CHATTER,
@@ -184,6 +186,26 @@ def test_what_makes_no_sense_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("muros.space.cyclone._space.installed_version", lambda: "")
     with pytest.raises(SpaceError, match=r"pip install 'cyclonedds==11\.0\.1'.*dds: needs nothing"):
         open_space("cyclonedds:")
+
+
+def test_a_domain_may_be_configured_anew_when_its_last_space_has_left(rig: Rig, domain: Domain) -> None:
+    secluded = open_space(f"cyclonedds:{domain}", range="OFF")
+    secluded.participant("alone")
+    with open_space(f"cyclonedds:{domain}", interfaces=("lo",)) as second:
+        other = second.participant("with")
+
+        def met() -> bool:
+            second.tick()
+            secluded.tick()
+            return len(secluded.graph.nodes) == len(second.graph.nodes) == 2
+
+        rig.until(met, "two spaces of one process to meet")
+        other.close()
+    secluded.close()
+    ours, muros = rig.space(domain, "cyclonedds"), rig.space(domain)
+    ours.participant("ours")
+    muros.participant("muros")
+    rig.until(lambda: len(ours.graph.nodes) == len(muros.graph.nodes) == 2)
 
 
 def test_another_version_is_used_as_it_is_and_that_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

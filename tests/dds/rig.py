@@ -71,7 +71,8 @@ class Rig:
     def until(self, condition: Callable[[], object], what: str = "", wait: float = PATIENCE) -> None:
         """Let the loop run until `condition` holds; the test fails when it takes too long."""
         if not self.eventually(condition, wait):
-            pytest.fail(f"not within {wait:.0f} s: {what or condition}; findings: {self.told}")
+            where = ", ".join(space.url for space in self.spaces)
+            pytest.fail(f"not within {wait:.0f} s in {where}: {what or condition}; findings: {self.told}")
 
     def eventually(self, condition: Callable[[], object], wait: float = PATIENCE) -> bool:
         """Let the loop run until `condition` holds, at most `wait` seconds; whether it does."""

@@ -117,8 +117,9 @@ class CycloneSpace(Closing):
         if self.closed:
             return
         self.closed = True
-        for home in self._domains.values():
+        for number, home in self._domains.items():
             home.close()
+            _release(number)
         self._core.driver.stop()
         self._domains.clear()
         self._core.queue.clear()
@@ -140,7 +141,12 @@ class CycloneSpace(Closing):
             if not 0 <= number <= MAX_DOMAIN:
                 raise ValueError(f"domain {number} does not exist; domains go from 0 to {MAX_DOMAIN}")
             _configure(number, self._config)
-            home = self._domains[number] = CycloneDomain(number, self._core, self._ros_distro)
+            try:
+                home = CycloneDomain(number, self._core, self._ros_distro)
+            except SpaceError:
+                _release(number)
+                raise
+            self._domains[number] = home
             if self._core.driver.loop is not None:
                 home.attach(self._core.driver.loop)
         return home
@@ -157,7 +163,7 @@ def open_cyclone(
 
     Options: the fields of `Limits`; `interfaces`, `peers`, `range` or a whole `network` (`NetworkSettings`) instead
     of what the environment says, or `config`, a configuration of Cyclone DDS as XML; `ros_distro`. Without any of
-    them CYCLONEDDS_URI decides, if it is set. Cyclone takes the configuration of a domain once in a process.
+    them CYCLONEDDS_URI decides, if it is set. The first space of a process in a domain decides for the others there.
     """
     if rest and not (rest.isascii() and rest.isdigit()):
         raise SpaceError(
@@ -215,8 +221,8 @@ def configuration(settings: NetworkSettings) -> str:
     )
 
 
-_configured: Final[dict[int, Any]] = {}
-"""Domains of Cyclone by number: there is one of each in a process, for good."""
+_configured: Final[dict[int, tuple[Any, int]]] = {}
+"""Domains of Cyclone by number, with how many spaces are in each: Cyclone has one of each in a process."""
 
 
 def _configure(number: int, config: str | None) -> None:
@@ -224,16 +230,27 @@ def _configure(number: int, config: str | None) -> None:
     from cyclonedds.core import DDSException
     from cyclonedds.domain import Domain
 
-    if number in _configured:
-        return
-    try:
-        _configured[number] = Domain(number, config)
-    except DDSException as error:
-        if error.code != DDSException.DDS_RETCODE_PRECONDITION_NOT_MET:
-            raise SpaceError(
-                f"Cyclone DDS does not take the configuration of domain {number}: {error}"
-            ) from None
-        _configured[number] = None
+    made, users = _configured.get(number, (None, 0))
+    if not users:
+        try:
+            made = Domain(number, config)
+        except DDSException as error:
+            if error.code != DDSException.DDS_RETCODE_PRECONDITION_NOT_MET:  # somebody else has made it
+                raise SpaceError(
+                    f"Cyclone DDS does not take the configuration of domain {number}: {error}"
+                ) from None
+    _configured[number] = made, users + 1
+
+
+def _release(number: int) -> None:
+    """A space has left a domain; with the last one it goes, and may be configured anew."""
+    from muros.space.cyclone._participant import delete
+
+    made, users = _configured.pop(number)
+    if users > 1:
+        _configured[number] = made, users - 1
+    elif made is not None:
+        delete(made)
 
 
 def _settings(domain: int | None, options: dict[str, Any]) -> NetworkSettings:
