@@ -208,3 +208,31 @@ def test_an_on_problem_that_raises_when_the_streams_began_again() -> None:
     assert run(world, 5000) == 1
     assert device.session.state == CONNECTED
     assert device.states.count(CONNECTING) == 2
+
+
+def test_a_board_without_room_for_what_it_borrows_goes_on_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The heap of a board may be full when a message was lost, or the agent is: nothing raises, it is done later."""
+    world = World()
+    device = Device(world).connect()
+    session = device.session
+
+    def nothing(name: str = "") -> None:
+        raise MemoryError(name)
+
+    monkeypatch.setattr("muros.client.session.borrow", nothing)
+    monkeypatch.setattr(session, "mend", nothing)
+    world.network.loss = 0.5
+    for i in range(20):
+        device.writer.write_bytes(b"%d" % i)
+        device.host_writer.write(b"%d" % i)
+        world.run(20)
+    assert session.mender is None
+    world.network.partition(["client"])
+    world.run(3000)
+    assert session.state == CONNECTED, "it has no room for the guide"
+    monkeypatch.undo()
+    world.network.heal()
+    world.network.loss = 0.0
+    world.run(3000)
+    assert session.state == CONNECTED
+    assert device.got == [b"%d" % i for i in range(20)]

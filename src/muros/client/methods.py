@@ -24,8 +24,11 @@ _KIND_REQUESTER = const(7)
 _KIND_REPLIER = const(8)
 _CONNECTED = const(2)
 _OFFLINE = const(0)
+_FULL = const(1)
+_HEAD = const(4)
 _TOO_LONG = const(4)
 _PROBLEM_OFFLINE = const(7)
+_PROBLEM_FULL = const(8)
 _PROBLEM_UNREACHABLE = const(9)
 _PROBLEM_LARGEST = const(10)
 _INDICES = const(4096)
@@ -126,9 +129,13 @@ def index(self: "Session", kind: int) -> int:
 
 def defer(self: "Session", writer: "Any", message: "Outgoing", n: int) -> bool:
     """What becomes of a sample that cannot go out now: it is queued, cut up, or refused and counted."""
-    if self.queue == 0 and (self.state != _CONNECTED or writer.todo):
-        dropped(self, _OFFLINE, _PROBLEM_OFFLINE, n, writer)
-        return False
+    if self.queue == 0 and self.backlog is None:
+        if self.state != _CONNECTED or writer.todo:
+            dropped(self, _OFFLINE, _PROBLEM_OFFLINE, n, writer)
+            return False
+        if n + 2 * _HEAD <= writer.stream.mtu - len(self.head):
+            dropped(self, _FULL, _PROBLEM_FULL, n, writer)
+            return False
     taken: bool = borrow("muros.client.requests").keep(self).defer(writer, message, n)
     return taken
 

@@ -136,12 +136,7 @@ class Session(SessionCore):
             now = ticks_ms()
         self.now = now
         taken = _receive(self) if self.up else 0
-        if self.guide is None and self.up and self.pending == 0 and self.foreign < _FOREIGN:
-            if loans:
-                release()
-            self.watch(now)
-        else:
-            self.lead().turn(self, now)
+        _turn(self, now)
         if not self.login and self.state != _LOST:
             if self.backlog is not None:
                 self.backlog.pump()
@@ -291,13 +286,28 @@ class Entity:
         return session.defer(self, message, n)
 
 
+def _turn(session: Session, now: int) -> None:
+    """Does what the connection needs. When there is no room for the guide, there may be at the next turn."""
+    try:
+        if session.guide is None and session.up and session.pending == 0 and session.foreign < _FOREIGN:
+            if loans:
+                release()
+            session.watch(now)
+        else:
+            session.lead().turn(session, now)
+    except MemoryError:
+        pass
+
+
 def _receive(session: Session) -> int:
     """Takes what has come; the number of messages. The transport raises when the way is gone."""
     try:
         return session.transport.receive(session._deliver)
     except OSError as error:
         session.gone(error)
-        return 0
+    except MemoryError:
+        pass  # no room for what mends streams: the message counts as lost
+    return 0
 
 
 def _head(entity: Entity, at: int, n: int) -> None:
