@@ -4,6 +4,7 @@ SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 BIN := .venv/bin
 PYTEST_ARGS ?=
+WORKERS ?= 3 # processes that run tests; most of the time they wait for others
 
 .DEFAULT_GOAL := help
 .PHONY: help setup test lint unit format coverage demo bench budgets docs-check changelog build clean distclean
@@ -25,7 +26,7 @@ lint: setup ## Style, formatting, types and the order of the rooms
 	run lint-imports --no-logo; test -z "$$failed"
 
 unit: setup ## All tests (PYTEST_ARGS="tests/xrce -k stream" chooses)
-	@echo "== pytest" && $(BIN)/pytest $(PYTEST_ARGS)
+	@echo "== pytest" && $(BIN)/pytest -n $(WORKERS) --dist loadfile $(PYTEST_ARGS)
 
 format: setup ## Let ruff mend style and formatting
 	@$(BIN)/ruff check --quiet --fix . ; $(BIN)/ruff format --quiet .

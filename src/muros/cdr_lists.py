@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 def sequence(at: "list[Any]", code: str, bound: int = 0) -> "Any":
     """The next sequence: an array, bytes, or a list of strings or bools. Allocates twice its bytes."""
-    if code == "?":
-        return list(map(bool, sequence(at, "B", bound)))
+    bools = code == "?"
+    if bools:
+        code = "B"
     size = calcsize(code)
     n = count(at, size, bound)
     if code == "s":
@@ -28,6 +29,8 @@ def sequence(at: "list[Any]", code: str, bound: int = 0) -> "Any":
     n *= size
     p = part(at, size, n) if n else 0
     data = bytes(memoryview(at[0])[p : p + n])
+    if bools:
+        return list(map(bool, data))
     return data if code == "B" else array(code, data)
 
 

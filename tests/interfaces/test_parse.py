@@ -322,6 +322,21 @@ def test_unknown_names_get_a_suggestion() -> None:
     assert not interfaces.known("nonsense")
 
 
+def test_what_a_name_is_does_not_depend_on_what_was_used_before() -> None:
+    interfaces.message("std_msgs/msg/Int32")
+    interfaces.service("std_srvs/srv/Empty")
+    interfaces.action("example_interfaces/action/Fibonacci")
+    for wrong in ("std_msgs/msg/Int32", "example_interfaces/action/Fibonacci"):
+        with pytest.raises(InterfaceError, match="is no service"):
+            interfaces.service(wrong)
+    with pytest.raises(InterfaceError, match="is a service, not a message"):
+        interfaces.message("std_srvs/srv/Empty")
+    with pytest.raises(InterfaceError, match="is an action, not a message"):
+        interfaces.message("example_interfaces/action/Fibonacci")
+    with pytest.raises(InterfaceError, match="is no action"):
+        interfaces.action("std_msgs/msg/Int32")
+
+
 def test_the_distribution_is_chosen(monkeypatch: pytest.MonkeyPatch) -> None:
     assert Registry().distro == "lyrical"
     monkeypatch.setenv("MUROS_DISTRO", "humble")

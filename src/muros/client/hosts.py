@@ -78,6 +78,12 @@ class Session(board.Session):
         super().__init__(transport, client_key, session_id, mtu, history, **options)
         _remember(self)
 
+    @property
+    def key(self) -> bytes:
+        """The client key, 4 bytes."""
+        key: bytes = self.notes["key"]
+        return key
+
     def problem(self, code: int, value: int = 0, what: object = "") -> None:
         """Tells ``on_problem``, or whoever reads standard error."""
         said = reasons.text(self, code, value, what)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from threading import RLock
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar
 
 from muros.interfaces import _hashes, _host
 from muros.interfaces import _model as model
@@ -81,6 +81,9 @@ def message(name: str, distro: str | None = None) -> type[Any]:
             if made is None:
                 made = _host.build(home, home.message(full), lambda nested: message(nested, distro))
                 _classes[home, full] = made
+    if issubclass(made, (ServiceType, ActionType)):
+        kind = "a service" if issubclass(made, ServiceType) else "an action"
+        raise InterfaceError(f"{full} is {kind}, not a message")
     return made
 
 
@@ -99,7 +102,10 @@ def service(name: str, distro: str | None = None) -> type[ServiceType]:
                 Request=message(described.request.name, distro),
                 Response=message(described.response.name, distro),
             )
-        return cast("type[ServiceType]", _classes[home, full])
+        made = _classes[home, full]
+    if not issubclass(made, ServiceType):
+        raise InterfaceError(f"{full} is no service")
+    return made
 
 
 def action(name: str, distro: str | None = None) -> type[ActionType]:
@@ -121,7 +127,10 @@ def action(name: str, distro: str | None = None) -> type[ActionType]:
                 GetResult=service(described.get_result.name, distro),
                 FeedbackMessage=message(described.feedback_message.name, distro),
             )
-        return cast("type[ActionType]", _classes[home, full])
+        made = _classes[home, full]
+    if not issubclass(made, ActionType):
+        raise InterfaceError(f"{full} is no action")
+    return made
 
 
 def load(name: str, distro: str | None = None) -> type[Any]:
