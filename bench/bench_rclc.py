@@ -36,7 +36,10 @@ def main() -> None:
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     url = f"dds:{options.domain}"
     if options.role:
-        {"rclc": answer_by_rclc, "door": lambda url: asyncio.run(answer_at_the_door(url))}[options.role](url)
+        if options.role == "rclc":
+            answer_by_rclc(url)
+        else:
+            asyncio.run(answer_at_the_door(url))
         return
     in_one_process(20_000)
     trips: dict[str, Callable[[str, int], list[float]]] = {
@@ -112,10 +115,14 @@ def ask_by_rclc(url: str, count: int) -> list[float]:
     got.clear()
     while executor.spin_some(0.2):
         got.clear()
+
+    def answered(number: int) -> Callable[[], bool]:
+        return lambda: len(got) > number
+
     for i in range(count):
         start = time.perf_counter()
         ping.publish(Int32(data=i))
-        until(lambda i=i: len(got) > i)
+        until(answered(i))
         times.append(time.perf_counter() - start)
     context.close()
     return times

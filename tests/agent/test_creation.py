@@ -471,6 +471,28 @@ def test_qos_in_binary_reaches_the_space(qos: Qos, words: str) -> None:
     assert str(reader.qos) == words
 
 
+@pytest.mark.parametrize("whose", ["endpoint", "group"])
+def test_partitions_in_xml_reach_the_space(whose: str) -> None:
+    """Clients write them with the endpoint, as Fast DDS profiles do, or with its publisher or subscriber."""
+    names = "<qos><partition><names><name>left</name></names></partition></qos>"
+    of_group, own = (names, "") if whose == "group" else ("", names)
+    topic = "<topic><kind>NO_KEY</kind><name>rt/chatter</name><dataType>T</dataType></topic>"
+    bench = Bench()
+    client = Raw(bench).base("rt/chatter", "T")
+    for group, end, group_id, object_id in (
+        (Kind.PUBLISHER, Kind.DATAWRITER, PUBLISHER, WRITER),
+        (Kind.SUBSCRIBER, Kind.DATAREADER, SUBSCRIBER, READER),
+    ):
+        tag = group.name.lower()
+        document = f"<dds><{tag}><name>group</name>{of_group}</{tag}></dds>"
+        assert client.make(group_id, text(group, document)) == STATUS_OK
+        tag = "data_writer" if end is Kind.DATAWRITER else "data_reader"
+        document = f"<dds><{tag}>{topic}{own}</{tag}></dds>"
+        assert client.make(object_id, text(end, document)) == STATUS_OK
+    (writer,), (reader,) = bench.space.graph.writers, bench.space.graph.readers
+    assert (writer.qos.partitions, reader.qos.partitions) == (("left",), ("left",))
+
+
 def test_a_late_reader_gets_what_was_kept_for_it() -> None:
     bench = Bench()
     qos = Qos(depth=3, durability="transient_local")

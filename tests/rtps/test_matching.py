@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from muros._partitions import partitions_meet
 from muros.rtps import (
     READER_QOS,
     WRITER_QOS,
@@ -22,7 +23,7 @@ from muros.rtps import (
     Policy,
     Reliability,
 )
-from muros.rtps._matching import mismatches, partitions_meet
+from muros.rtps._matching import mismatches
 
 SECOND = 10**9
 

@@ -681,6 +681,29 @@ class SpaceConformance:
         assert take_all(reader) == [b"new"]
         assert (reader.expired, reader.lost) == (held, 0)
 
+    @pytest.mark.parametrize(
+        ("offered", "wanted", "met"),
+        [
+            (("left",), ("left",), True),
+            (("left", "right"), ("right",), True),
+            (("left",), ("right",), False),
+            (("left",), (), False),
+            ((), ("left",), False),
+            (("left",), ("l*",), True),
+            (("",), (), True),
+        ],
+    )
+    def test_partitions(
+        self, space: Space, offered: tuple[str, ...], wanted: tuple[str, ...], met: bool
+    ) -> None:
+        writer = space.participant("talker").writer(CHATTER, RELIABLE.replace(partitions=offered))
+        reader = space.participant("listener").reader(CHATTER, RELIABLE.replace(partitions=wanted))
+        self.settle(space)
+        assert writer.write(b"x")
+        self.settle(space)
+        assert take_all(reader) == ([b"x"] if met else [])
+        assert bool(writer.matched) is bool(reader.matched) is met
+
     def test_deadlines(self, space: Space, told: list[Finding]) -> None:
         qos = RELIABLE.replace(deadline=100 * MS)
         writer = space.participant("talker").writer(CHATTER, qos)

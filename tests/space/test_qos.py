@@ -110,6 +110,7 @@ def test_in_words(qos: Qos, words: str) -> None:
         (Qos(liveliness=Liveliness.MANUAL_BY_TOPIC), Qos(liveliness=Liveliness.AUTOMATIC), []),
         (Qos(lease=11), Qos(lease=10), ["lease"]),
         (Qos(ownership=Ownership.EXCLUSIVE), Qos(), ["ownership"]),
+        (Qos(partitions=("a",)), Qos(partitions=("b",)), ["partition"]),
         (Qos(ownership=Ownership.EXCLUSIVE, strength=1), Qos(ownership=Ownership.EXCLUSIVE), []),
         (Qos(lifespan=1), Qos(lifespan=2), []),
         (Qos(Reliability.BEST_EFFORT), Qos(deadline=1), ["reliability", "deadline"]),

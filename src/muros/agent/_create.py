@@ -24,7 +24,6 @@ from muros.xrce.representation import (
     DataReaderEntity,
     DataWriterEntity,
     Durability,
-    EndpointQos,
     Entity,
     Format,
     InvalidRepresentation,
@@ -146,10 +145,10 @@ def build(
             return GroupProxy(object_id, entity, participant, variant.kind)
         if isinstance(entity, DataWriterEntity):
             topic = _topic(entity, participant, objects)
-            return WriterProxy(object_id, entity, participant, topic, _qos(entity.effective_qos, entity))
+            return WriterProxy(object_id, entity, participant, topic, _qos(entity, parent))
         if isinstance(entity, DataReaderEntity):
             topic = _topic(entity, participant, objects)
-            return ReaderProxy(object_id, entity, participant, topic, _qos(entity.effective_qos, entity))
+            return ReaderProxy(object_id, entity, participant, topic, _qos(entity, parent))
         if isinstance(entity, RequesterEntity):
             return RequesterProxy(
                 object_id,
@@ -230,7 +229,10 @@ def _services(limits: Limits) -> Qos:
     return Qos.preset("services_default").replace(depth=limits.request_history)
 
 
-def _qos(qos: EndpointQos, entity: DataWriterEntity | DataReaderEntity) -> Qos:
+def _qos(entity: DataWriterEntity | DataReaderEntity, parent: Proxy) -> Qos:
+    qos = entity.effective_qos
+    group = parent.entity
+    grouped = group.partitions if isinstance(group, PublisherEntity | SubscriberEntity) else ()
     return Qos(
         reliability=Reliability.RELIABLE if qos.reliable else Reliability.BEST_EFFORT,
         durability=_DURABILITY[qos.durability],
@@ -240,4 +242,5 @@ def _qos(qos: EndpointQos, entity: DataWriterEntity | DataReaderEntity) -> Qos:
         lifespan=(qos.lifespan_ms or 0) * _MS,
         ownership=Ownership.EXCLUSIVE if qos.exclusive else Ownership.SHARED,
         strength=(entity.ownership_strength or 0) if isinstance(entity, DataWriterEntity) else 0,
+        partitions=qos.partitions or grouped,
     )

@@ -3,23 +3,17 @@
 What the writer offers must be at least what the reader requests. The reasons are for people to read.
 """
 
-from collections.abc import Callable, Iterable
-from fnmatch import fnmatchcase
+from collections.abc import Callable
 from typing import Final
 
+from muros._partitions import partitions_meet, partitions_text
 from muros.rtps._constants import keyed
 from muros.rtps._discovery_data import EndpointData
 from muros.rtps._news import Mismatch, Policy
 from muros.rtps._qos import XCDR1, XCDR2, EndpointQos, Liveliness, Ownership, Reliability
 from muros.rtps._values import INFINITE, split_guid
 
-__all__ = ["mismatches", "partitions_meet"]
-
-MAX_PARTITION: Final = 256
-"""Characters of the name of a partition; longer ones meet nobody, for patterns cost time."""
-
-MAX_PARTITION_PAIRS: Final = 10_000
-"""Comparisons of partition names of one writer and one reader; pairs with more do not meet."""
+__all__ = ["mismatches"]
 
 
 def mismatches(writer: EndpointData, reader: EndpointData) -> tuple[Mismatch, ...]:
@@ -46,8 +40,8 @@ def mismatches(writer: EndpointData, reader: EndpointData) -> tuple[Mismatch, ..
         found.append(
             Mismatch(
                 Policy.PARTITION,
-                f"the writer is in {_partitions(writer.qos.partitions)}, "
-                f"the reader in {_partitions(reader.qos.partitions)}",
+                f"the writer is in {partitions_text(writer.qos.partitions)}, "
+                f"the reader in {partitions_text(reader.qos.partitions)}",
             )
         )
     if (offers := _offered_representation(writer.qos)) not in (accepts := _accepted(reader.qos)):
@@ -61,36 +55,7 @@ def mismatches(writer: EndpointData, reader: EndpointData) -> tuple[Mismatch, ..
     return tuple(found)
 
 
-def partitions_meet(ours: tuple[str, ...], theirs: tuple[str, ...]) -> bool:
-    """Whether two have a partition in common (DDS 1.4, 2.2.3.13). Names may be patterns, but not both of them."""
-    if not (ours or theirs):
-        return True
-    mine, yours = ours or ("",), theirs or ("",)
-    if len(mine) * len(yours) > MAX_PARTITION_PAIRS:
-        return False
-    return any(_meet(one, other) for one in mine for other in yours)
-
-
 # --- Helpers ---------------------------------------------------------------------------------------------
-
-
-def _meet(one: str, other: str) -> bool:
-    if len(one) > MAX_PARTITION or len(other) > MAX_PARTITION:
-        return False
-    if _is_pattern(one):
-        return not _is_pattern(other) and fnmatchcase(other, one)
-    if _is_pattern(other):
-        return fnmatchcase(one, other)
-    return one == other
-
-
-def _is_pattern(name: str) -> bool:
-    return "*" in name or "?" in name or "[" in name
-
-
-def _partitions(names: Iterable[str]) -> str:
-    words = ", ".join(repr(name) for name in names)
-    return f"partition {words}" if words else "the default partition"
 
 
 def _period(ns: int) -> str:

@@ -10,6 +10,7 @@ from enum import IntEnum
 from typing import Final, NamedTuple
 
 from muros._kinds import Durability, History, Liveliness, Ownership, Reliability
+from muros._partitions import partitions_meet, partitions_text
 
 __all__ = [
     "PRESETS",
@@ -52,6 +53,8 @@ class Qos:
     ownership: Ownership = Ownership.SHARED
     strength: int = 0
     """With exclusive ownership, the strongest writer is heard."""
+    partitions: tuple[str, ...] = ()
+    """Names, or patterns with * and ?, of the groups of endpoints it belongs to; none = the one named ""."""
 
     def __post_init__(self) -> None:
         if not 0 <= self.depth <= MAX_DEPTH:
@@ -90,6 +93,8 @@ class Qos:
             parts.append(f"liveliness {_words(self.liveliness)} {duration(self.lease)}")
         if self.ownership:
             parts.append(f"exclusive, strength {self.strength}")
+        if self.partitions:
+            parts.append(partitions_text(self.partitions))
         return ", ".join(parts)
 
 
@@ -150,7 +155,7 @@ def _often_enough(offered: int, wanted: int) -> bool:
     return wanted == NONE or NONE < offered <= wanted
 
 
-# DDS 1.4, 2.2.3: the policies whose "RxO" property is yes and that this space knows.
+# DDS 1.4, 2.2.3: the policies whose "RxO" property is yes and that this space knows, and the partition.
 _RULES: Final = (
     _Rule(
         "reliability",
@@ -187,6 +192,12 @@ _RULES: Final = (
         lambda offered, wanted: offered.ownership == wanted.ownership,
         lambda qos: f"{_words(qos.ownership)} ownership",
         "Use the same ownership on both sides",
+    ),
+    _Rule(
+        "partition",
+        lambda offered, wanted: partitions_meet(offered.partitions, wanted.partitions),
+        lambda qos: partitions_text(qos.partitions),
+        "Put both sides into one partition",
     ),
 )
 

@@ -43,6 +43,8 @@ def to_policies(qos: Qos, limits: Limits, *, writes: bool, user_data: bytes = b"
         liveliness(qos.lease or INFINITE),
         Policy.Ownership.Exclusive if qos.ownership else Policy.Ownership.Shared,
     ]
+    if qos.partitions:
+        policies.append(Policy.Partition(qos.partitions))
     if qos.keeps_all:
         policies.append(Policy.ResourceLimits(limits.resource_limit, -1, limits.resource_limit))
     if writes:
@@ -91,6 +93,7 @@ def from_policies(policies: Any) -> Qos:
         lease=_period(getattr(liveliness, "lease_duration", INFINITE)),
         ownership=Ownership.EXCLUSIVE if get("Ownership") == Policy.Ownership.Exclusive else Ownership.SHARED,
         strength=getattr(strength, "strength", 0),
+        partitions=tuple(getattr(get("Partition"), "partitions", ())),
     )
 
 

@@ -29,6 +29,7 @@ def to_wire(qos: Qos, limits: Limits) -> EndpointQos:
         lease=qos.lease or INFINITE,
         ownership=qos.ownership,
         strength=qos.strength,
+        partitions=qos.partitions,
         representations=REPRESENTATIONS,
     )
 
@@ -46,6 +47,7 @@ def from_wire(qos: EndpointQos) -> Qos:
         lease=_period(qos.lease),
         ownership=qos.ownership,
         strength=qos.strength,
+        partitions=qos.partitions,
     )
 
 
