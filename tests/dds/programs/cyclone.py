@@ -17,7 +17,7 @@ from collections.abc import Callable
 from typing import Any
 
 from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
-from cyclonedds.core import Policy, Qos
+from cyclonedds.core import Listener, Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import make_idl_struct
 from cyclonedds.pub import DataWriter
@@ -85,11 +85,18 @@ class Node:
         self.tell()
         return made
 
-    def reader(self, topic: str, type_name: str, qos: Any) -> Any:
-        made = DataReader(self.participant, Topic(self.participant, topic, opaque(type_name)), qos)
+    def reader(self, topic: str, type_name: str, qos: Any, listener: Any = None) -> Any:
+        about = Topic(self.participant, topic, opaque(type_name))
+        made = DataReader(self.participant, about, qos, listener)
         self.readers.append(made)
         self.tell()
         return made
+
+    def forget(self, *entities: Any) -> None:
+        """Keep no hold of these."""
+        self.writers = [writer for writer in self.writers if writer not in entities]
+        self.readers = [reader for reader in self.readers if reader not in entities]
+        self.tell()
 
 
 class Publisher:
@@ -105,10 +112,25 @@ class Publisher:
 class Subscription:
     def __init__(self, node: Node, topic: str, type: str, qos: Any) -> None:
         self.type = type
-        self.reader = node.reader("rt" + topic, dds_name(type), policies(qos))
+        self.heard = Heard()
+        self.reader = node.reader("rt" + topic, dds_name(type), policies(qos), self.heard)
 
     def matched(self) -> int:
         return len(self.reader.get_matched_publications())
+
+
+class Heard(Listener):  # type: ignore[misc]
+    """What a reader is told of its writers."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.events: list[str] = []
+
+    def on_requested_deadline_missed(self, reader: Any, status: Any) -> None:
+        self.events.append("deadline")
+
+    def on_liveliness_changed(self, reader: Any, status: Any) -> None:
+        self.events.append(f"{status.alive_count} alive")
 
 
 class Caller:
@@ -180,7 +202,11 @@ class Cyclone:
         self.things.clear()
 
     def destroy(self, thing: int) -> None:
-        del self.things[thing]
+        """Take a publisher or subscription out."""
+        gone = self.things.pop(thing)
+        for node in self.things.values():
+            if isinstance(node, Node):
+                node.forget(getattr(gone, "writer", None), getattr(gone, "reader", None))
 
     def publisher(self, node: int, topic: str, type: str, qos: dict[str, Any] | int = 10) -> int:
         return self._keep(Publisher(self.things[node], topic, type, qos))
@@ -226,6 +252,12 @@ class Cyclone:
         )
         wait_for(lambda: present() == count, wait)
         return present()
+
+    def events(self, subscription: int, last: str, wait: float = 10.0) -> list[str]:
+        """What it was told, "deadline" or "1 alive": waits for `last` to be the last."""
+        seen = self.things[subscription].heard.events
+        wait_for(lambda: seen[-1:] == [last], wait)
+        return list(seen)
 
     def service(self, node: int, name: str, type: str, rule: str = "{}") -> int:
         return self._keep(Caller(self.things[node], name, type, True, rule))
@@ -334,7 +366,29 @@ def policies(qos: dict[str, Any] | int) -> Any:
         keep,
         *([Policy.DurabilityService(0, keep, -1, -1, -1)] if latched else []),
         Policy.DataRepresentation(True, False),
+        *(make(qos[name]) for name, make in FURTHER.items() if name in qos),
+        *(
+            [LIVELINESS[qos["liveliness"]](period(qos["liveliness_lease_duration"]))]
+            if "liveliness" in qos
+            else []
+        ),
     )
+
+
+def period(seconds: float) -> int:
+    return int(duration(milliseconds=seconds * 1000))
+
+
+FURTHER: dict[str, Callable[[Any], Any]] = {
+    "deadline": lambda seconds: Policy.Deadline(period(seconds)),
+    "lifespan": lambda seconds: Policy.Lifespan(period(seconds)),
+    "strength": lambda strength: Policy.OwnershipStrength(strength),
+    "ownership": lambda kind: getattr(Policy.Ownership, kind.capitalize()),
+}
+LIVELINESS: dict[str, Callable[[int], Any]] = {
+    "automatic": Policy.Liveliness.Automatic,
+    "manual_by_topic": Policy.Liveliness.ManualByTopic,
+}
 
 
 def encode(type: str, message: dict[str, Any]) -> bytes:

@@ -159,6 +159,12 @@ class Ros:
         self._wait(lambda: len(seen) >= count, wait)
         return list(seen)
 
+    def events(self, subscription: int, last: str, wait: float = 10.0) -> list[str]:
+        """What a subscription was told of its publishers, "deadline" or "1 alive": waits for `last` to be the last."""
+        seen = self.things[subscription].events
+        self._wait(lambda: seen[-1:] == [last], wait)
+        return list(seen)
+
     # Services
 
     def service(self, node: int, name: str, type: str, rule: str = "{}") -> int:
@@ -395,8 +401,11 @@ class Subscription:
     def __init__(self, ros: Ros, node: Any, type: Any, topic: str, qos: QoSProfile) -> None:
         self.got: list[Any] = []
         self.problems: list[str] = []
+        self.events: list[str] = []
         events = SubscriptionEventCallbacks(
-            incompatible_qos=lambda event: ros._happened(self.problems, str(event.last_policy_kind))
+            incompatible_qos=lambda event: ros._happened(self.problems, str(event.last_policy_kind)),
+            deadline=lambda event: ros._happened(self.events, "deadline"),
+            liveliness=lambda event: ros._happened(self.events, f"{event.alive_count} alive"),
         )
         self.inner = node.create_subscription(
             type, topic, lambda message: ros._happened(self.got, message), qos, event_callbacks=events
@@ -413,7 +422,8 @@ def profile(qos: dict[str, Any] | int) -> QoSProfile:
     """A profile from its policies' names, or a depth."""
     if isinstance(qos, int):
         return QoSProfile(depth=qos)
-    named = {"history": "HistoryPolicy", "reliability": "ReliabilityPolicy", "durability": "DurabilityPolicy"}
+    words = ("history", "reliability", "durability", "liveliness")
+    named = {word: f"{word.capitalize()}Policy" for word in words}
     values: dict[str, Any] = {}
     for key, value in qos.items():
         if key in named:
