@@ -2,9 +2,10 @@
 
 from muros.compat import const
 from muros.xrce import inputs
-from muros.xrce.beginning import begin, flush, reset, stranger
+from muros.xrce.beginning import begin, flush, stranger
 from muros.xrce.fragments import Cutter
 from muros.xrce.outputs import make
+from muros.xrce.resetting import reset
 from muros.xrce.session import SessionCore
 from tests.board.harness import allocates
 

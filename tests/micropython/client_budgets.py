@@ -179,9 +179,9 @@ CLIENT_BUDGETS: tuple[Budget, ...] = (
         "import of client and rclc, everything but transports", 20_000, "B", GAUGE, partial(imported, CORE)
     ),
     Budget(
-        "the same with pieces under way, a ping and losses", 26_500, "B", GAUGE, partial(imported, TROUBLED)
+        "the same with pieces under way, a ping and losses", 26_000, "B", GAUGE, partial(imported, TROUBLED)
     ),
-    Budget("bytecode of the same with what is borrowed", 40_300, "B", ("mpy-cross",), flash),
+    Budget("bytecode of the same with what is borrowed", 40_700, "B", ("mpy-cross",), flash),
     Budget(
         "session, MTU 256, history 4, both directions",
         3_200,
@@ -220,10 +220,10 @@ CLIENT_BUDGETS: tuple[Budget, ...] = (
     Budget("live heap, publisher and subscription of 64 B, connected", 28_000, "B", GAUGE, heap_of_a_program),
     Budget(
         "smallest heap of the same over UDP, as .mpy, 64 bit",
-        68,
+        66,
         "kB",
         ("unix", "mpy-cross"),
-        partial(running, "mpy", 68),
+        partial(running, "mpy", 66),
     ),
     Budget(
         "smallest heap of the same over UDP, as .py, 64 bit",

@@ -5,7 +5,7 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from muros.xrce import beginning, inputs, outputs
+from muros.xrce import beginning, inputs, outputs, resetting
 from muros.xrce._types import Buffer
 from muros.xrce.constants import HANDLED, LATER
 from muros.xrce.queues import QueuedReliableOutput, resume
@@ -43,7 +43,7 @@ class End(SessionCore):
         self._begin = start
         self.make_input(RELIABLE)
 
-    reset = beginning.reset
+    reset = resetting.reset
     stranger = beginning.stranger
     heartbeats = flush = beginning.flush
 

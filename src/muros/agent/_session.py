@@ -20,7 +20,7 @@ from muros.agent._proxies import (
     _Readable,
 )
 from muros.agent.events import EntityCreated, EntityDeleted, client_name
-from muros.xrce import beginning, inputs
+from muros.xrce import beginning, inputs, resetting
 from muros.xrce._types import Buffer
 from muros.xrce.constants import (
     CREATE,
@@ -66,7 +66,7 @@ _IDENTITY = 24
 class AgentSession(SessionCore):
     """A client's session. ``key`` is the client key as bytes, ``mtu`` the longest message the client takes."""
 
-    reset = beginning.reset
+    reset = resetting.reset
     stranger = beginning.stranger
     heartbeats = flush = beginning.flush
 

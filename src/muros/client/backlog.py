@@ -8,7 +8,7 @@ acknowledged (DDS-XRCE 1.0, 8.4.10 to 8.4.14). Boards borrow this for as long as
 
 from muros.compat import const
 from muros.xrce.fragments import Cutter
-from muros.xrce.outputs import head
+from muros.xrce.requests import head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:

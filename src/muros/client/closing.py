@@ -2,7 +2,7 @@
 
 from muros.client.link import WAITING, enter
 from muros.compat import const
-from muros.xrce.outputs import head
+from muros.xrce.requests import head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from muros.client.names import dds_type, topic_name
 from muros.client.requests import keep, requests, submit
 from muros.compat import const, ticks_add, ticks_diff
 from muros.xrce import create as binary
-from muros.xrce.beginning import reset
+from muros.xrce.resetting import reset
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:

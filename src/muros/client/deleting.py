@@ -3,7 +3,7 @@
 from muros.client.entities import object_id, steps
 from muros.client.requests import keep, requests
 from muros.compat import const
-from muros.xrce.outputs import head
+from muros.xrce.requests import head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """Requests of a session, in its reliable stream. Boards borrow this."""
 
 from muros.compat import borrow, const
-from muros.xrce.outputs import head, reserve
+from muros.xrce.requests import head, reserve
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:

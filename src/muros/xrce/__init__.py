@@ -15,7 +15,9 @@ module                runs on    holds
 ``queues``            hosts      streams of hosts with many sessions
 ``fragments``         both       joining and cutting samples that are larger than a message
 ``session``           both       a session: headers, streams, acknowledgements; either role
-``beginning``         both       a session when it is made and begins again
+``beginning``         both       a session when it is made
+``resetting``         both       streams that begin again
+``requests``          both       submessages with ids
 ``create``            both       CREATE and READ_DATA payloads, as a client writes them
 ``entities``          hosts      what a client asks for, as values
 ``representation``    hosts      the same payloads, as an agent reads them from foreign bytes

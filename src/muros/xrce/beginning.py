@@ -1,6 +1,6 @@
 """A session's core when it is made and begins again; its control messages. See ``session``. Boards borrow this."""
 
-from muros.compat import borrow, const
+from muros.compat import const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -36,15 +36,6 @@ def begin(
     self._handle = handle
     self._control = bytearray(_CONTROL - len(self.head)) + self.head + bytes(_LONGEST_CONTROL)
     self._control[_CONTROL + 1] = _LITTLE_ENDIAN
-
-
-def reset(self: "SessionCore") -> None:
-    """All streams, both ways, begin again with number 0; what they keep is dropped."""
-    inputs = borrow("muros.xrce.inputs")
-    for stream_id in self.inputs:
-        inputs.reset(self.inputs[stream_id])
-    for stream_id in self.outputs:
-        self.outputs[stream_id].reset()
 
 
 def stranger(self: "SessionCore", buf: "Buffer", at: int) -> None:

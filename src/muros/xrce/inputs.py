@@ -1,6 +1,8 @@
 """Receivers when they are made and begin again. See ``streams``. Boards borrow this."""
 
 from muros.compat import const
+from muros.xrce.resetting import reset_input
+from muros.xrce.resetting import reset_input as reset  # noqa: F401
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -27,12 +29,4 @@ def begin(self: "Input", stream_id: int, mtu: int = 0, window: int = 1) -> None:
     self.window = window
     self.lost = 0
     self.early = {}
-    reset(self)
-
-
-def reset(self: "Input") -> None:
-    """Expects number 0 again; kept messages are dropped."""
-    self.expected = self.known = self.resume_at = 0
-    self.early.clear()
-    self.busy = False
-    self.fragments = None
+    reset_input(self)

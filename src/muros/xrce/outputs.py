@@ -6,6 +6,9 @@ Boards borrow this; its functions are methods of ``streams.Output``.
 from array import array
 
 from muros.compat import const
+from muros.xrce.requests import reserve as reserve
+from muros.xrce.resetting import reset_output
+from muros.xrce.resetting import reset_output as reset  # noqa: F401
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -48,37 +51,7 @@ def begin(
     for at in range(0, len(self.buf), mtu or 1):
         self.buf[at : at + self._start] = head
         self.buf[at + 1] = stream_id
-    reset(self)
-
-
-def reset(self: "Output") -> None:
-    """Begins again with number 0; every kept message is dropped."""
-    self.first = self.sent = self.next = self._again = self._again_at = 0
-
-
-def reserve(self: "Output", n: int) -> int:
-    """``place`` and ``commit`` for what is certain to be written."""
-    at = self.place(n)
-    if at >= 0:
-        self.commit(at, n)
-    return at
-
-
-def head(buf: bytearray, at: int, kind: int, flags: int, n: int, request: int, object_id: int) -> None:
-    """Writes the header of a submessage with ``n`` bytes of payload, and the ids that its payload begins with.
-
-    A payload of 64 KiB or more has length 0: it runs to the end of the message.
-    """
-    if n > 0xFFFF:
-        n = 0
-    buf[at] = kind
-    buf[at + 1] = flags
-    buf[at + 2] = n & 255
-    buf[at + 3] = n >> 8
-    buf[at + 4] = request >> 8
-    buf[at + 5] = request & 255
-    buf[at + 6] = object_id >> 8
-    buf[at + 7] = object_id & 255
+    reset_output(self)
 
 
 def capacity(self: "Output") -> int:
