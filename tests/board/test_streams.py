@@ -3,6 +3,7 @@
 from muros.compat import const
 from muros.xrce import inputs, outputs
 from muros.xrce.mending import accept, advance, announce, missing, resend
+from muros.xrce.resetting import reset_input
 from tests.board.harness import allocates, raises
 from tests.board.test_session import End, message, submessage
 
@@ -453,7 +454,7 @@ def test_heartbeat_gives_everything_up() -> None:
 def test_reset_of_a_receiver() -> None:
     stream = receiver(start=500)
     take(stream, 503)
-    inputs.reset(stream)
+    reset_input(stream)
     assert missing(stream) == 0
     assert take(stream, 503) == []
     assert take(stream, 0) == [0]

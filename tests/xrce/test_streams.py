@@ -10,6 +10,7 @@ from muros.xrce import inputs, outputs
 from muros.xrce._types import Buffer, Send
 from muros.xrce.mending import accept, advance, announce, missing, resend
 from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableOutput
+from muros.xrce.resetting import reset_input
 from muros.xrce.streams import Input, Output
 
 HEAD = b"\x81\0\0\0"
@@ -117,7 +118,7 @@ def test_a_receiver_does_what_the_book_says(start: int, window: int, told: list[
             handled = model.take(model.expected + first, second)
             assert feed(stream, stream.expected + first, second) == handled
         elif what == "reset":
-            inputs.reset(stream)
+            reset_input(stream)
             model = Model(0, window)
         else:
             at = stream.expected

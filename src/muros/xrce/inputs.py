@@ -2,7 +2,6 @@
 
 from muros.compat import const
 from muros.xrce.resetting import reset_input
-from muros.xrce.resetting import reset_input as reset  # noqa: F401
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ from array import array
 from muros.compat import const
 from muros.xrce.requests import reserve as reserve
 from muros.xrce.resetting import reset_output
-from muros.xrce.resetting import reset_output as reset  # noqa: F401
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
 
 _HEAD = const(4)
 _STREAM_RELIABLE = const(0x80)
+
+reset = reset_output
 
 
 def make(stream_id: int, mtu: int, head: bytearray, history: int = 1, period: int = 0) -> "Output":

@@ -8,7 +8,8 @@ from collections import deque
 
 from muros.xrce._types import Send
 from muros.xrce.mending import go_on
-from muros.xrce.outputs import begin, reset
+from muros.xrce.outputs import begin
+from muros.xrce.resetting import reset_output
 from muros.xrce.session import SessionCore
 from muros.xrce.streams import Output
 
@@ -96,7 +97,7 @@ class QueuedReliableOutput(Output):
 
     def reset(self) -> None:
         """Begins again with number 0; every kept or waiting message is dropped."""
-        reset(self)
+        reset_output(self)
         self._kept = self._waiting = None
 
     def _append(self, submessage: bytes, send: Send, now: int) -> None:

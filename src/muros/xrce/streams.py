@@ -22,7 +22,7 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from array import array
 
-    from muros.xrce import outputs
+    from muros.xrce import outputs, resetting
     from muros.xrce._types import Send
     from muros.xrce.fragments import Joiner
 
@@ -49,7 +49,7 @@ class Output:
         _again: int  # bit i: message first + i was sent again at _again_at
         _again_at: int
 
-        reset = outputs.reset
+        reset = resetting.reset_output
         reserve = outputs.reserve
         capacity = outputs.capacity
         idle = outputs.idle
