@@ -19,7 +19,9 @@ def copy(folder: Path, *words: str) -> int:
 
 
 @pytest.mark.parametrize(
-    "options", [(), ("--mpy",), ("--mpy", "--march", "x64")], ids=["py", "mpy", "native"]
+    "options",
+    [(), ("--mpy",), ("--mpy", "--lean"), ("--mpy", "--march", "x64")],
+    ids=["py", "mpy", "lean", "native"],
 )
 def test_a_program_runs_from_the_folder(
     options: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -29,7 +31,9 @@ def test_a_program_runs_from_the_folder(
     assert copy(tmp_path, "std_msgs/msg/String", *options) == 0
     out = capsys.readouterr().out
     assert f"mpremote fs cp -r {tmp_path}/muros {tmp_path}/std_msgs :lib/" in out
-    assert ("Left out: native code (muros/xrce/_viper.py)" in out) == (options == ("--mpy",))
+    assert ("Left out: native code (muros/xrce/_viper.py)" in out) == (
+        "--mpy" in options and "--march" not in options
+    )
     suffixes = {path.suffix for path in tmp_path.rglob("*.*")}
     assert suffixes == ({".mpy"} if options else {".py"})
     link = UdpLink(0, "127.0.0.1")
@@ -39,7 +43,7 @@ def test_a_program_runs_from_the_folder(
         arguments = ["127.0.0.1", str(link.port)]
         assert run_mpy(program, arguments, library=[tmp_path]).endswith("done\n")
         serial = "from muros.xrce import serial; print(hasattr(serial, 'NATIVE'))"
-        assert run_mpy(serial, library=[tmp_path]) == f"{options != ('--mpy',)}\n"
+        assert run_mpy(serial, library=[tmp_path]) == f"{options == () or '--march' in options}\n"
     finally:
         agent.stop()
 

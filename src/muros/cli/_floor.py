@@ -98,7 +98,12 @@ def is_native(source: bytes) -> bool:
     )
 
 
-def mpy(path: str, source: bytes, march: str | None = None) -> bytes:
+def lean_mpy(path: str, source: bytes, march: str | None = None) -> bytes:
+    """As ``mpy``, without the numbers of lines that tracebacks show."""
+    return mpy(path, source, march, lines=False)
+
+
+def mpy(path: str, source: bytes, march: str | None = None, lines: bool = True) -> bytes:
     """A source compiled by mpy-cross, whose tracebacks name ``path``. Raises CompileError.
 
     Message classes go without the numbers of their lines, which nobody looks up in generated code, and are named by
@@ -109,7 +114,9 @@ def mpy(path: str, source: bytes, march: str | None = None) -> bytes:
         file.write_bytes(source)
         options = [f"-march={march}"] if march else []
         generated = Path(path).parent.name in ("msg", "srv", "action")
-        options += ["-X", "no-source-lines", "-s", Path(path).stem] if generated else ["-s", path]
+        options += ["-s", Path(path).stem if generated else path]
+        if generated or not lines:
+            options += ["-X", "no-source-lines"]
         done = subprocess.run(
             [_mpy_cross(), *options, "-o", str(out), str(file)],
             capture_output=True,
