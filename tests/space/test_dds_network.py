@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from muros.rtps import EndpointQos, inline_qos
+from muros.rtps import EndpointQos, ParticipantLost, Why, inline_qos
 from muros.space import (
     Appeared,
     Durability,
@@ -207,6 +207,59 @@ class TestGids:
         assert got == [
             (gids[0][1], number, numbered(value)) for number, value in enumerate((0, 1, 10, 11, 20, 21), 1)
         ]
+
+    def test_who_comes_again_at_once_never_left_for_others(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """A departure that overtakes, or is lost, would leave peers with the old life."""
+        net = Net(loss=0.2)
+        other = net.stranger(monkeypatch)
+        one, two = net.computer(), net.computer()
+        two.space.participant("watcher")
+        events = other.process.events[other.participant.prefix]
+        for life in range(5):
+            board = one.space.participant(f"life{life}", key=b"board", enclave=f"/{life}")
+            writer = board.writer(CHATTER, RELIABLE, key=1)
+            if life % 2:
+                board.reader(Topic("rt/odd", "T"), key=2)
+            net.until(lambda life=life: f"life{life}" in {node.name for node in two.graph.nodes})  # type: ignore[misc]
+            net.until(lambda writer=writer: two.graph.endpoint(writer.gid))  # type: ignore[misc]
+            net.until(lambda life=life: (two.graph.topic("rt/odd") is not None) == bool(life % 2))  # type: ignore[misc]
+            board.close()
+            net.until(lambda: {node.name for node in two.graph.nodes} == {"watcher"})
+            assert two.graph.endpoint(writer.gid) is None
+        assert not [event for event in events if isinstance(event, ParticipantLost)]
+        assert other.process.core.participants
+        data = {each.prefix: each for each in other.participant.participants}[board.gid[:12]]
+        assert data.user_data == b"enclave=/4;"
+        net.run(5 * SECOND)
+        (lost,) = (event for event in events if isinstance(event, ParticipantLost))
+        assert lost.participant.prefix == board.gid[:12]
+        assert lost.why is Why.LEFT
+
+    def test_who_comes_again_may_be_no_node_any_more(self) -> None:
+        net = Net()
+        one, two = net.computer(), net.computer()
+        two.space.participant("watcher")
+        one.space.participant("node", key=b"k").close()
+        nameless = one.space.participant("", key=b"k")
+        net.run(2 * SECOND)
+        assert [node.name for node in two.graph.nodes] == ["watcher"]
+        nameless.close()
+        again = one.space.participant("node", key=b"k")
+        net.run(2 * SECOND)
+        assert {node.name for node in two.graph.nodes} == {"watcher", "node"}
+        assert again.gid == nameless.gid
+
+    def test_a_space_that_closes_leaves_nobody_behind(self) -> None:
+        net = Net()
+        one, two = net.computer(), net.computer()
+        two.space.participant("watcher")
+        for i in range(3):
+            one.space.participant(f"n{i}", key=bytes((i,)))
+        one.space.participant("gone", key=b"g").close()
+        net.until(lambda: len(two.graph.participants) == 5)
+        one.space.close()
+        net.run(50 * MS)
+        assert [each.name for each in two.graph.participants] == ["watcher"]
 
     def test_two_spaces_never_share_what_a_key_gives(self) -> None:
         net = Net()

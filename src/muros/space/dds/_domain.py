@@ -45,6 +45,7 @@ from muros.space._graph import (
 from muros.space._qos import Mismatch, duration, mismatches
 from muros.space.dds._dialects import Dialect
 from muros.space.dds._endpoints import DdsEndpoint, DdsReader, DdsWriter
+from muros.space.dds._lingering import Lingering
 from muros.space.dds._names import service_of, type_hash
 from muros.space.dds._nodes import Nodes
 from muros.space.dds._problems import report_domain
@@ -119,6 +120,8 @@ class DdsDomain:
         self._distro = ros_distro
         self._lasts: dict[bytes, int] = {}
         self.nodes: Final = Nodes(self, ros_distro)
+        self.lingering: Final = Lingering(self)
+        self.closing = False
         self._making = 0
         self._postponed: deque[tuple[_Handler, DdsParticipant, rtps.ParticipantEvent]] = deque()
 
@@ -146,6 +149,14 @@ class DdsDomain:
         elif (due := self.next()) is not None:
             self.core.need(due)
 
+    def close(self) -> None:
+        """Everybody leaves, for good."""
+        self.closing = True
+        for participant in tuple(self.participants.values()):
+            participant.close()
+        self.lingering.close()
+        self.carrier.close()
+
     def resume(self, reader: DdsReader) -> None:
         """There is room in a reader that had refused samples."""
         self.core.post(_Resume(self, reader))
@@ -163,17 +174,25 @@ class DdsDomain:
             self.core.settle()
         self.poke()
 
-    def leave(self, participant: DdsParticipant) -> None:
-        """A participant of ours goes; its endpoints are out of the books already."""
-        self.nodes.leave(participant)
+    def leave(self, participant: DdsParticipant, *, lingers: bool) -> None:
+        """A participant of ours goes; its endpoints are out of the books already.
+
+        lingers: they are withdrawn, too, and it may come again.
+        """
+        self.nodes.leave(participant, lingers=lingers)
         del self.participants[participant.gid[:12]]
         if self.core.watchers:
             self.core.tell(Vanished(participant.info()))
-        participant.rtps.close(self.now())
+        if self.lead is participant:
+            self.nodes.listen_no_more()
+        if lingers:
+            self.lingering.keep(participant)
+        else:
+            participant.rtps.close(self.now())
         if self.lead is participant:
             self.lead = None
             # The youngest: where all leave, in whatever order, the books pass on once or never.
-            following = next(reversed(self.participants.values()), None)
+            following = None if self.closing else next(reversed(self.participants.values()), None)
             if following is not None:
                 self._take_lead(following)
             else:

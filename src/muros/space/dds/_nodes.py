@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from muros.rtps import Received
+from muros.rtps import LocalReader, Received
 from muros.space._graph import Appeared, Vanished
 from muros.space._participant import READER_KIND, WRITER_KIND
 from muros.space._timers import Timer
@@ -50,32 +50,45 @@ class Nodes:
         self._sizes_seen: set[int] = set()
         self._changed: dict[DdsParticipant, None] = {}
         self._timer: Timer | None = None
+        self._reader: LocalReader | None = None
 
     def join(self, participant: DdsParticipant) -> None:
         """A participant of ours has come: tell of it, if it is a node."""
-        if not participant.name:
-            return
         home = self._home
-        participant.told = participant.rtps.writer(
-            *INFO_TOPIC,
-            to_wire(INFO_QOS, home.core.limits),
-            now=home.now(),
-            entity=WRITER,
-            last=home.recall(participant.gid[:12] + WRITER.to_bytes(4, "big")),
-        )
+        if not participant.name:
+            if participant.told is not None:
+                participant.told.close(home.now())
+                participant.told = None
+            return
+        if participant.told is None:
+            participant.told = participant.rtps.writer(
+                *INFO_TOPIC,
+                to_wire(INFO_QOS, home.core.limits),
+                now=home.now(),
+                entity=WRITER,
+                last=home.recall(participant.gid[:12] + WRITER.to_bytes(4, "big")),
+            )
         self.changed(participant)
 
-    def leave(self, participant: DdsParticipant) -> None:
-        """A participant of ours goes; that its endpoints go with it says enough."""
-        if participant.told is not None:
-            self._home.remember(participant, participant.told.guid, participant.told.last)
+    def leave(self, participant: DdsParticipant, *, lingers: bool) -> None:
+        """A participant of ours goes: tell that it is no node any more, if that is not clear from its going."""
         self._changed.pop(participant, None)
+        if participant.told is not None:
+            if lingers:
+                self._write(participant)
+            self._home.remember(participant, participant.told.guid, participant.told.last)
 
     def listen(self, participant: DdsParticipant) -> None:
         """Hear of others' nodes, through this participant of ours."""
         home = self._home
         qos = to_wire(INFO_QOS, home.core.limits)
-        participant.rtps.reader(*INFO_TOPIC, qos, self._hear, now=home.now(), entity=READER)
+        self._reader = participant.rtps.reader(*INFO_TOPIC, qos, self._hear, now=home.now(), entity=READER)
+
+    def listen_no_more(self) -> None:
+        """The participant that listened goes."""
+        if self._reader is not None:
+            self._reader.close(self._home.now())
+            self._reader = None
 
     def changed(self, participant: DdsParticipant) -> None:
         """The endpoints of a node are others than before: tell everybody soon."""
@@ -92,10 +105,15 @@ class Nodes:
         home = self._home
         changed, self._changed = self._changed, {}
         for participant in changed:
-            if participant.told is not None and not participant.closed:
-                payload = encapsulated(participant.told_entities().body(self._gid_size))
-                participant.told.write(payload, home.now(), source_time=home.core.clock())
+            if not participant.closed:
+                self._write(participant)
         home.poke()
+
+    def _write(self, participant: DdsParticipant) -> None:
+        """Tell of one node as it is now."""
+        if participant.told is not None:
+            payload = encapsulated(participant.told_entities().body(self._gid_size))
+            participant.told.write(payload, self._home.now(), source_time=self._home.core.clock())
 
     def _hear(self, received: Received) -> bool:
         """Somebody tells of its nodes."""

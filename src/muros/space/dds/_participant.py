@@ -47,14 +47,23 @@ class DdsParticipant(EngineParticipant):
         """Whether its GIDs come again in another life."""
         self.told: rtps.LocalWriter | None = None
         """Tells others of the node."""
-        self.rtps = home.carrier.core.participant(
-            prefix,
-            now=home.now(),
-            name=self.owner,
-            user_data=f"enclave={enclave};".encode(),
-            properties=home.properties,
-            on_event=partial(home.on_event, self),
-        )
+        user_data = f"enclave={enclave};".encode()
+        on_event = partial(home.on_event, self)
+        former = home.lingering.take(prefix)
+        if former is None:
+            self.rtps = home.carrier.core.participant(
+                prefix,
+                now=home.now(),
+                name=self.owner,
+                user_data=user_data,
+                properties=home.properties,
+                on_event=on_event,
+            )
+        else:
+            self.rtps, self.told, _ = former
+            self.rtps.on_event = on_event
+            if self.rtps.data.user_data != user_data:
+                self.rtps.set_user_data(user_data, home.now())
 
     def writer(self, topic: Topic, qos: Qos | None = None, *, key: int | None = None) -> DdsWriter:
         """A new writer."""
@@ -115,9 +124,13 @@ class DdsParticipant(EngineParticipant):
             return
         self.closed = True
         children, self._children = self._children, []
+        home = self.home
+        lingers = self.keyed and not home.closing
         for child in reversed(children):
-            self._forget(child)
-        self.home.leave(self)
+            endpoints = self._forget(child)
+            if lingers:
+                _close(endpoints, home.now())
+        home.leave(self, lingers=lingers)
         self.core.settle()
 
     def in_use(self, gid: bytes) -> bool:
@@ -126,8 +139,7 @@ class DdsParticipant(EngineParticipant):
 
     def take_out(self, child: Child) -> None:
         """Close a child."""
-        for endpoint in self._forget(child):
-            (endpoint.out if isinstance(endpoint, DdsWriter) else endpoint.source).close(self.home.now())
+        _close(self._forget(child), self.home.now())
         self.home.nodes.changed(self)
         self.home.poke()
 
@@ -139,7 +151,7 @@ class DdsParticipant(EngineParticipant):
             for endpoint in _endpoints(child):
                 (writers if isinstance(endpoint, DdsWriter) else readers).append(endpoint.gid)
         node = NodeEntities(self.namespace, self.name, tuple(readers), tuple(writers))
-        return DiscoveryInfo(self.gid, (node,))
+        return DiscoveryInfo(self.gid, () if self.closed else (node,))
 
     def _add(self, child: Child, *endpoints: DdsEndpoint) -> None:
         home = self.home
@@ -199,6 +211,12 @@ def _endpoints(child: Child) -> tuple[DdsEndpoint, ...]:
         return (child,)
     assert not isinstance(child, EngineEndpoint)
     return (child.reader, child.writer)  # type: ignore[return-value]
+
+
+def _close(endpoints: tuple[DdsEndpoint, ...], now: int) -> None:
+    """Withdraw them from all others."""
+    for endpoint in endpoints:
+        (endpoint.out if isinstance(endpoint, DdsWriter) else endpoint.source).close(now)
 
 
 def _typed(topic: Topic) -> Topic:

@@ -120,9 +120,7 @@ class DdsSpace(Closing):
             return
         self.closed = True
         for home in tuple(self._domains.values()):
-            for participant in tuple(home.participants.values()):
-                participant.close()
-            home.carrier.close()
+            home.close()
         self._core.driver.stop()
         self._domains.clear()
         self._core.queue.clear()
