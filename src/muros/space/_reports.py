@@ -8,6 +8,7 @@ __all__ = [
     "no_server",
     "reply_unmatched",
     "request_overwritten",
+    "request_unanswered",
     "server_too_slow",
     "several_servers",
     "types_differ",
@@ -57,6 +58,19 @@ def server_too_slow(core: Core, who: str, service: str, n: int, waited: int = 0)
         what=f"{{n}} request{{s}} of {who} to {service} given up",
         why="the server did not take them" + (f" within {duration(waited)}" if waited else " at once"),
         remedy="Ask less often, or make the server take its requests faster",
+        n=n,
+    )
+
+
+def request_unanswered(core: Core, who: str, service: str, n: int) -> None:
+    """The server has gone, or vanished, with requests that it had not answered."""
+    core.report(
+        "request-unanswered",
+        who=who,
+        subject=service,
+        what=f"{{n}} request{{s}} of {who} to {service} will not be answered",
+        why="the server they were given to has gone",
+        remedy="Ask again; a server that died is noticed only when its lease is over",
         n=n,
     )
 

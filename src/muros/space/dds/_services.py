@@ -48,11 +48,14 @@ __all__ = ["DdsReplier", "DdsRequester"]
 SHIFTED_MOST: Final = 1000
 """Requests remembered whose reply carries another number than the door gave them."""
 
+OPEN_MOST: Final = 1000
+"""Requests remembered that are not answered yet."""
+
 
 class DdsRequester(EngineRequester):
     """The client's side of a service. See `muros.space.Requester`."""
 
-    __slots__ = ("_client_id", "_inline", "_number", "_servers", "_shifted", "reader", "writer")
+    __slots__ = ("_client_id", "_inline", "_number", "_open", "_servers", "_shifted", "reader", "writer")
 
     def __init__(
         self,
@@ -70,6 +73,8 @@ class DdsRequester(EngineRequester):
         self._inline = inline_request(reader_gid)
         self._client_id = client_id(writer_gid)
         self._number = 0
+        self._open: dict[int, tuple[bytes, ...]] = {}
+        """Readers of requests that were given a request which is not answered yet, by its number."""
         self._shifted: dict[int, int] = {}
         self._servers = 0
 
@@ -97,10 +102,17 @@ class DdsRequester(EngineRequester):
         readers = writer.matched
         home = writer.participant.home
         dialects = {gid: home.dialect_of(gid) for gid in readers}
+        if len(self._open) >= OPEN_MOST:
+            del self._open[next(iter(self._open))]
+        self._open[request.sequence] = readers  # before it goes: a server in this process may answer at once
         if len(set(dialects.values())) == 1:
-            return self._put(request, dialects[readers[0]], None)
-        sent = [self._put(request, dialect, gid) for gid, dialect in dialects.items()]
-        return any(sent)
+            sent = self._put(request, dialects[readers[0]], None)
+        else:
+            put = [self._put(request, dialect, gid) for gid, dialect in dialects.items()]
+            sent = any(put)
+        if not sent:
+            self._open.pop(request.sequence, None)
+        return sent
 
     def number_of(self, reply: Sample) -> int | None:
         """Number of the request that is answered."""
@@ -111,14 +123,19 @@ class DdsRequester(EngineRequester):
         home = self.writer.participant.home
         if home.dialect_of(received.writer) is Dialect.HEADER:
             ids = split_header(payload[4:], payload[0] << 8 | payload[1])
-            return (ids[1], 4 + HEADER_SIZE) if ids is not None and ids[0] == self._client_id else None
+            if ids is None or ids[0] != self._client_id:
+                return None
+            self._open.pop(ids[1], None)
+            return ids[1], 4 + HEADER_SIZE
         related = self.reader.related(received)
         if related is None:
             return None
         gid, sequence = split_identity(related)
         if gid not in (self.reader.gid, self.writer.gid):
             return None
-        return self._shifted.get(sequence, sequence), 4
+        number = self._shifted.get(sequence, sequence)
+        self._open.pop(number, None)
+        return number, 4
 
     def met(self) -> None:
         """Somebody matches the writer or the reader: there may be a server now."""
@@ -129,6 +146,17 @@ class DdsRequester(EngineRequester):
             _reports.several_servers(writer.core, writer.owner, self.service.name, servers)
         if servers and self._waiting:
             self.flush()
+
+    def left(self) -> None:
+        """A reader of requests has gone: what was given to it, and to nobody else who is there, stays unanswered."""
+        here = set(self.writer.matched)
+        lost = [number for number, readers in self._open.items() if here.isdisjoint(readers)]
+        for number in lost:
+            del self._open[number]
+        if lost:
+            writer = self.writer
+            _reports.request_unanswered(writer.core, writer.owner, self.service.name, len(lost))
+        self.met()
 
     def _put(self, request: Sample, dialect: Dialect, to: bytes | None) -> bool:
         data, inline = request.data, self._inline
@@ -343,7 +371,7 @@ class _RequestWriter(DdsWriter):
 
     def disconnected(self, remote: bytes) -> None:
         """A reader of requests matches no more."""
-        self._requester.met()
+        self._requester.left()
 
 
 class _ReplyReader(DdsReader):

@@ -45,6 +45,7 @@ PROBLEMS: Final = {
     "liveliness-lost": 39,
     "writer-silent": 41,
     "mixed-distros": 42,
+    "request-unanswered": 43,
 }
 """The numbers of what is about nodes, topics and services, by the code of the finding; see docs/space.md."""
 
