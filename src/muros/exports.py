@@ -22,6 +22,9 @@ rclc.context Context Node
 rclc.errors CapacityError InvalidNameError RclError
 rclc.executor Executor
 rclc.guard GuardCondition
+rclc.illegal TransitionError
+rclc.lifecycle Lifecycle
+rclc.lifecycle_client LifecycleClient
 rclc.middleware register
 rclc.service Service
 rclc.subscription Subscription

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from muros.rclc.errors import RclError as RclError
     from muros.rclc.executor import Executor as Executor
     from muros.rclc.guard import GuardCondition as GuardCondition
+    from muros.rclc.illegal import TransitionError as TransitionError
+    from muros.rclc.lifecycle import Lifecycle as Lifecycle
+    from muros.rclc.lifecycle_client import LifecycleClient as LifecycleClient
     from muros.rclc.middleware import register as register
     from muros.rclc.service import Service as Service
     from muros.rclc.subscription import Subscription as Subscription

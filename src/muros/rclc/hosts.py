@@ -6,6 +6,7 @@ Errors are TypeErrors and ValueErrors whose ``code`` is the return code of the C
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -27,6 +28,7 @@ from muros.rclc.middleware import _engines, open_url
 if TYPE_CHECKING:
     from muros.client.qos import Qos
     from muros.rclc._types import Publisher as AnyPublisher
+    from muros.rclc.lifecycle import Lifecycle
     from muros.rclc.timer import Timer
     from muros.xrce._types import Buffer
 
@@ -172,6 +174,24 @@ class Node(context_.Node):
         made.name = full
         requester = self.context.middleware.requester
         return self._join(made, lambda: requester(self.participant, made.name, kind.TYPE, made.deliver, qos))
+    def lifecycle(
+        self,
+        on_configure: Callable[[], object] | None = None,
+        on_activate: Callable[[], object] | None = None,
+        on_deactivate: Callable[[], object] | None = None,
+        on_cleanup: Callable[[], object] | None = None,
+        on_shutdown: Callable[[], object] | None = None,
+        on_error: Callable[[], object] | None = None,
+        services: bool = True,
+        time: Callable[[], tuple[int, int]] | None = None,
+    ) -> Lifecycle:
+        """Makes this a managed node; see ``muros.rclc.node.lifecycle``. Its events bear the system's time."""
+        given = (on_configure, on_activate, on_deactivate, on_cleanup, on_shutdown, on_error, time)
+        for callback in given:
+            if callback is not None:
+                _be_callable(callback, "a callback of a lifecycle")
+        return node_.lifecycle(self, *given[:-1], services, time or _now)
+
 
     def _join(self, handle: Made, make: Callable[[], Any]) -> Made:
         """Gives a handle its entity; one that cannot be made leaves nothing behind."""
@@ -374,6 +394,11 @@ class Executor(executor_.Executor):
             handles.spin_period(self, period)
         except KeyboardInterrupt:
             self.context.close()
+
+
+def _now() -> tuple[int, int]:
+    """The system's time in seconds and nanoseconds."""
+    return divmod(time.time_ns(), 1_000_000_000)
 
 
 def _be_text(name: Any, what: str) -> None:

@@ -1,7 +1,7 @@
 """The methods of nodes, which make what programs use. Boards borrow this."""
 
 from muros.client.names import resolve, topic_name
-from muros.compat import const
+from muros.compat import borrow, const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from muros.rclc._types import Publisher
     from muros.rclc.client import Client
     from muros.rclc.context import Context, Node
+    from muros.rclc.lifecycle import Callback, Lifecycle
     from muros.rclc.service import Service
     from muros.rclc.subscription import Subscription
     from muros.rclc.timer import Timer
@@ -91,6 +92,30 @@ def client(self: "Node", kind: "Any", name: str, qos: "str | Qos" = "services") 
         self.participant, self._resolve(name), kind.TYPE, made.deliver, qos
     )
     self.entities.append(made)
+    return made
+
+
+def lifecycle(
+    self: "Node",
+    on_configure: "Callback | None" = None,
+    on_activate: "Callback | None" = None,
+    on_deactivate: "Callback | None" = None,
+    on_cleanup: "Callback | None" = None,
+    on_shutdown: "Callback | None" = None,
+    on_error: "Callback | None" = None,
+    services: bool = True,
+    time: "Callable[[], tuple[int, int]] | None" = None,
+) -> "Lifecycle":
+    """Makes this a managed node: others move it from unconfigured to inactive and active, and back.
+
+    The callbacks take nothing. One that returns False has failed: the node stays where it was. One that raises leads
+    to ``on_error``, after which the node is unconfigured; without it, or where it fails, finalized. What was raised
+    is in ``error`` and told to ``on_problem``. Without ``services`` only this program moves the node. ``time()`` is
+    what events are stamped with, (seconds, nanoseconds) such as ``TimeSync.time``: on hosts the system's, else 0.
+    Needs the types of lifecycle_msgs, see docs/lifecycle.md. Raises RclError for a node that is a managed one already.
+    """
+    callbacks = (on_configure, on_activate, on_deactivate, on_cleanup, on_shutdown, on_error)
+    made: "Lifecycle" = borrow("muros.rclc.lifecycles").begin(self, callbacks, services, time)
     return made
 
 

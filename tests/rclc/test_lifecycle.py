@@ -1,0 +1,298 @@
+"""Managed nodes: the state machine against the table of ROS 2, what callbacks decide, what is told and held back."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from muros.rclc import CapacityError, Executor, RclError, TransitionError, lifecycle_states, lifecycles
+from muros.rclc.lifecycle import Lifecycle
+from tests.client.world import World
+from tests.rclc.test_rclc import Board
+
+from std_msgs.msg import Int32
+
+TABLE = json.loads((Path(__file__).parents[1] / "vectors/rmw/lifecycle.json").read_text())
+LABELS = ("configure", "activate", "deactivate", "cleanup", "shutdown", "error")
+UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = 1, 2, 3, 4
+
+
+class Managed:
+    """A managed node on a board: what its callbacks do, what it tells and what was called."""
+
+    def __init__(self, services: bool = True, **does: Callable[[], object]) -> None:
+        self.board = Board(World())
+        self.called: list[str] = []
+        self.problems: list[tuple[int, str]] = []
+        self.board.context.on_problem(lambda code, text: self.problems.append((code, text)))
+        callbacks: Any = {f"on_{name}": self._callback(name, does.get(name)) for name in LABELS}
+        self.lifecycle: Lifecycle = self.board.node.lifecycle(
+            services=services, time=lambda: (1700000000, 5), **callbacks
+        )
+        self.events: list[Any] = []
+        events: Any = self.lifecycle.events
+        events.publish = self._keep
+
+    def _callback(self, name: str, does: Callable[[], object] | None) -> Callable[[], object]:
+        def callback() -> object:
+            self.called.append(name)
+            return does() if does else None
+
+        return callback
+
+    def _keep(self, event: Any) -> bool:
+        self.events.append(event)
+        return True
+
+    def steps(self) -> list[tuple[str, str]]:
+        """Where each event says that it came from and went to."""
+        return [(event.start_state.label, event.goal_state.label) for event in self.events]
+
+    def go(self, *transitions: str) -> "Managed":
+        """Goes through transitions, all of which succeed."""
+        for transition in transitions:
+            assert self.lifecycle.change(transition)
+        return self
+
+
+def fail() -> bool:
+    return False
+
+
+def crash() -> None:
+    raise OSError("no sensor")
+
+
+def test_the_table_is_that_of_ros() -> None:
+    assert [(state["id"], state["label"]) for state in TABLE["states"]] == list(lifecycle_states.STATES)
+    rows = [(row["id"], row["label"], row["start_id"], row["goal_id"]) for row in TABLE["transitions"]]
+    assert rows == list(lifecycle_states.TRANSITIONS)
+    names = [row["name"].removeprefix("~/") for row in TABLE["interfaces"] if row["kind"] == "service"]
+    assert [name for name, _ in lifecycle_states.SERVICES] == names
+
+
+def test_create_and_destroy() -> None:  # L1
+    managed = Managed()
+    assert managed.lifecycle.state == TABLE["initial_state"] == "unconfigured"
+    assert len(managed.lifecycle.services) == 5
+    managed.board.node.destroy()
+    assert managed.board.context.handles == []
+    assert Managed(services=False).lifecycle.services == []
+
+
+def test_to_active_and_back() -> None:  # L2
+    managed = Managed()
+    states = []
+    for transition in ("configure", "activate", "deactivate", "cleanup"):
+        managed.go(transition)
+        states.append(managed.lifecycle.id)
+    assert states == [INACTIVE, ACTIVE, INACTIVE, UNCONFIGURED]
+
+
+def test_callbacks_are_called_in_their_order() -> None:  # L3
+    managed = Managed()
+    lifecycle = managed.lifecycle
+    for n, step in enumerate(
+        (lifecycle.configure, lifecycle.activate, lifecycle.deactivate, lifecycle.cleanup), 1
+    ):
+        assert step()
+        assert managed.called == list(LABELS[:n])
+
+
+def test_services_are_handles_that_an_executor_counts() -> None:  # L4
+    managed = Managed()
+    first, second, third, *_ = managed.lifecycle.services
+    small = Executor(managed.board.context, handles=1)
+    small.add(first)
+    with pytest.raises(CapacityError, match="handles=2"):
+        small.add(second)
+    large = Executor(managed.board.context, handles=3)
+    for handle in (first, second, third):
+        large.add(handle)
+
+
+@pytest.mark.parametrize("case", TABLE["cases"], ids=lambda case: "-".join(case["do"]))
+def test_cases(case: dict[str, Any]) -> None:
+    does: Any = {}
+    for word in case["do"]:
+        name, _, how = word.rstrip(")").partition("(")
+        if how:
+            does[name] = {"fails": fail, "raises": crash}[how]
+    managed = Managed(**does)
+    results = []
+    for word in case["do"]:
+        transition = word.partition("(")[0]
+        if case.get("error"):
+            with pytest.raises(TransitionError):
+                managed.lifecycle.change(transition)
+        else:
+            results.append(managed.lifecycle.change(transition))
+    assert results == [not does] * len(results)
+    assert managed.lifecycle.state == case.get("final", "unconfigured")
+    assert managed.called[: len(case.get("callback_order", []))] == case.get("callback_order", [])
+    if "events" in case:
+        assert managed.steps() == [tuple(event) for event in case["events"]]
+
+
+@pytest.mark.parametrize("start", ["unconfigured", "inactive", "active", "finalized"])
+@pytest.mark.parametrize("row", TABLE["transitions"], ids=lambda row: f"{row['id']}")
+def test_each_transition_is_legal_from_its_own_state_alone(start: str, row: dict[str, Any]) -> None:
+    """By its number; labels of steps that nobody may ask for are refused too."""
+    ways = {"inactive": ["configure"], "active": ["configure", "activate"], "finalized": ["shutdown"]}
+    managed = Managed().go(*ways.get(start, []))
+    managed.events.clear()
+    if row["start"] == start:
+        assert managed.lifecycle.change(row["id"])
+        (event, _) = managed.events
+        assert (event.transition.id, event.transition.label) == (row["id"], row["label"])
+        assert (event.start_state.id, event.goal_state.id) == (row["start_id"], row["goal_id"])
+    else:
+        with pytest.raises(
+            TransitionError, match=f"is {start}: there is no transition {row['id']}"
+        ) as caught:
+            managed.lifecycle.change(row["id"])
+        assert caught.value.code == 1
+        assert (managed.lifecycle.state, managed.events) == (start, [])
+
+
+@pytest.mark.parametrize(
+    "way", [[], ["configure"], ["configure", "activate"]], ids=lambda way: f"after{len(way)}"
+)
+@pytest.mark.parametrize("does", [None, fail])
+def test_shutdown_from_everywhere_ends_in_finalized(
+    way: list[str], does: Callable[[], object] | None
+) -> None:
+    callbacks: Any = {"shutdown": does} if does else {}
+    managed = Managed(**callbacks).go(*way)
+    assert managed.lifecycle.shutdown() is (does is None)
+    assert (managed.lifecycle.state, managed.called[-1]) == ("finalized", "shutdown")
+    assert managed.steps()[-1] == ("shuttingdown", "finalized")
+    with pytest.raises(TransitionError, match="from here, none at all"):
+        managed.lifecycle.configure()
+
+
+@pytest.mark.parametrize("name", LABELS[:5])
+@pytest.mark.parametrize(
+    ("on_error", "final"),
+    [(None, "unconfigured"), (fail, "finalized"), (crash, "finalized")],
+    ids=["recovers", "fails", "raises"],
+)
+def test_what_raises_is_an_error(name: str, on_error: Callable[[], object] | None, final: str) -> None:
+    way = {"activate": ["configure"], "deactivate": ["configure", "activate"], "cleanup": ["configure"]}
+    does: Any = {name: crash} | ({"error": on_error} if on_error else {})
+    managed = Managed(**does).go(*way.get(name, []))
+    assert not managed.lifecycle.change(name)
+    assert managed.lifecycle.state == final
+    assert managed.called[-2:] == [name, "error"]
+    assert managed.steps()[-2:] == [(managed.steps()[-2][0], "errorprocessing"), ("errorprocessing", final)]
+    assert isinstance(managed.lifecycle.error, OSError)
+    assert managed.problems[0] == (lifecycles.RAISED, f"on_{name} of node board raised OSError: no sensor")
+    assert len(managed.problems) == (2 if on_error is crash else 1)
+
+
+def test_an_error_without_callback_is_the_end() -> None:
+    node = Board(World()).node
+    node.context.on_problem(lambda code, text: None)
+    lifecycle = node.lifecycle(on_configure=crash)
+    assert not lifecycle.configure()
+    assert lifecycle.state == "finalized"
+
+
+@pytest.mark.parametrize(
+    ("result", "state"),
+    [(None, 2), (True, 2), (97, 2), ("done", 2), (0, 2), (False, 1), (98, 1), (99, 4)],
+)
+def test_what_callbacks_return(result: object, state: int) -> None:
+    lifecycle = Board(World()).node.lifecycle(on_configure=lambda: result)
+    assert lifecycle.configure() is (state == INACTIVE)
+    assert lifecycle.id == state
+
+
+def test_no_transition_within_a_transition() -> None:
+    managed = Managed(configure=lambda: managed.lifecycle.activate())
+    assert not managed.lifecycle.configure()
+    assert isinstance(managed.lifecycle.error, TransitionError)
+    assert (
+        "is configuring: there is no transition 'activate' from here, none at all" in managed.problems[0][1]
+    )
+
+
+def test_events_bear_the_time() -> None:
+    managed = Managed().go("configure")
+    assert [(event.stamp.sec, event.stamp.nanosec) for event in managed.events] == [(1700000000, 5)] * 2
+    lifecycle = Board(World()).node.lifecycle()
+    told: list[Any] = []
+    events: Any = lifecycle.events
+    events.publish = told.append  # which says None: not taken
+    lifecycle.configure()
+    assert told[0].stamp.sec > 1700000000, "the system's time"
+    assert lifecycle.lost == 2
+
+
+def test_managed_publishers_publish_while_active_alone() -> None:
+    managed = Managed()
+    publisher = managed.lifecycle.publisher(Int32, "value")
+    sent: list[int] = []
+    inner: Any = publisher.inner
+
+    def keep(message: Any) -> bool:
+        sent.append(message.data)
+        return True
+
+    inner._writer.publish = keep
+    number = 0
+
+    def publish(taken: bool) -> None:
+        nonlocal number
+        number += 1
+        assert publisher.publish(Int32(data=number)) is taken
+
+    publish(False)
+    publish(False)
+    assert managed.problems == [
+        (lifecycles.INACTIVE, "a message on value was not published: node board is unconfigured, not active")
+    ]
+    managed.go("configure")
+    publish(False)
+    managed.go("activate")
+    publish(True)
+    managed.go("deactivate")
+    publish(False)
+    assert (sent, publisher.held) == ([4], 4)
+    assert [text.split("node ")[1] for _, text in managed.problems] == [
+        "board is unconfigured, not active",
+        "board is inactive, not active",
+        "board is inactive, not active",
+    ]
+    managed.go("activate")
+    with pytest.raises(TypeError, match="publish takes std_msgs/msg/Int32 here, not 5"):
+        publisher.publish(5)
+    publisher.destroy()
+    assert managed.lifecycle.publishers == []
+
+
+def test_one_lifecycle_for_each_node() -> None:
+    node = Board(World()).node
+    node.lifecycle()
+    handles = list(node.context.handles)
+    with pytest.raises(RclError, match="node board has a lifecycle already"):
+        node.lifecycle()
+    assert node.context.handles == handles
+
+
+def test_a_lifecycle_that_cannot_be_made_leaves_nothing() -> None:
+    board = Board(World())
+    node = board.context.node("n" * 30)
+    with pytest.raises(ValueError, match=r"characters"):
+        node.lifecycle()
+    assert (node.entities, board.context.handles) == ([], [])
+
+
+@pytest.mark.parametrize("name", ["on_configure", "on_error", "time"])
+def test_callbacks_must_be_callable(name: str) -> None:
+    wrong: Any = {name: 5}
+    with pytest.raises(TypeError, match="a callback of a lifecycle is a function, not 5") as caught:
+        Board(World()).node.lifecycle(**wrong)
+    assert getattr(caught.value, "code", None) == 11
