@@ -26,6 +26,9 @@ rclc.illegal TransitionError
 rclc.lifecycle Lifecycle
 rclc.lifecycle_client LifecycleClient
 rclc.middleware register
+rclc.parameter_client ParameterClient
+rclc.parameter_errors ParameterError ParameterNotDeclaredError ParameterTypeError ParameterRejectedError
+rclc.parameters Parameter Parameters
 rclc.service Service
 rclc.subscription Subscription
 rclc.timer Timer
@@ -34,6 +37,7 @@ rclc.triggers all_of any_of one
 _ON_HOSTS = """
 client.hosts Session
 rclc.hosts Client Context Executor Node Service Subscription
+rclc.parameter_files ParameterClient
 """
 
 

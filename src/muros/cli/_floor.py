@@ -30,6 +30,7 @@ HOST_ONLY = frozenset(
         "muros/rclc/_types.py",
         "muros/rclc/hosts.py",
         "muros/rclc/middleware.py",
+        "muros/rclc/parameter_files.py",
         "muros/xrce/_crc.py",
         "muros/xrce/_types.py",
         "muros/xrce/constants.py",

@@ -27,6 +27,13 @@ if TYPE_CHECKING:
     from muros.rclc.lifecycle import Lifecycle as Lifecycle
     from muros.rclc.lifecycle_client import LifecycleClient as LifecycleClient
     from muros.rclc.middleware import register as register
+    from muros.rclc.parameter_client import ParameterClient as ParameterClient
+    from muros.rclc.parameter_errors import ParameterError as ParameterError
+    from muros.rclc.parameter_errors import ParameterNotDeclaredError as ParameterNotDeclaredError
+    from muros.rclc.parameter_errors import ParameterRejectedError as ParameterRejectedError
+    from muros.rclc.parameter_errors import ParameterTypeError as ParameterTypeError
+    from muros.rclc.parameters import Parameter as Parameter
+    from muros.rclc.parameters import Parameters as Parameters
     from muros.rclc.service import Service as Service
     from muros.rclc.subscription import Subscription as Subscription
     from muros.rclc.timer import Timer as Timer

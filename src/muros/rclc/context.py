@@ -68,6 +68,7 @@ class Node:
         timer = node.timer
         service = node.service
         client = node.client
+        parameters = node.parameters
         lifecycle = node.lifecycle
         destroy = node.destroy
         _topic = node._topic

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from muros.client.qos import Qos
     from muros.rclc._types import Publisher as AnyPublisher
     from muros.rclc.lifecycle import Lifecycle
+    from muros.rclc.parameters import Parameters
     from muros.rclc.timer import Timer
     from muros.xrce._types import Buffer
 
@@ -192,6 +193,25 @@ class Node(context_.Node):
                 _be_callable(callback, "a callback of a lifecycle")
         return node_.lifecycle(self, *given[:-1], services, time or _now)
 
+
+    def parameters(
+        self,
+        max: int = 0,
+        notify: bool = True,
+        undeclared: bool = False,
+        low_memory: bool = False,
+        longest: int = 0,
+    ) -> Parameters:
+        """The parameters of the node; see ``muros.rclc.node.parameters``. Any number, of any length, unless told else.
+
+        Raises RclError for a node that has some already.
+        """
+        if self._resolve("~/get_parameters") in self.context.services:
+            raise RclError(f"node {self.name!r} has parameters already: keep what parameters() gave")
+        from muros.rclc.parameter_files import kind
+        from muros.rclc.parameters import Parameters
+
+        return Parameters(self, max, notify, undeclared, low_memory, longest, kind, time.time_ns)
 
     def _join(self, handle: Made, make: Callable[[], Any]) -> Made:
         """Gives a handle its entity; one that cannot be made leaves nothing behind."""

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from muros.rclc.client import Client
     from muros.rclc.context import Context, Node
     from muros.rclc.lifecycle import Callback, Lifecycle
+    from muros.rclc.parameters import Parameters
     from muros.rclc.service import Service
     from muros.rclc.subscription import Subscription
     from muros.rclc.timer import Timer
@@ -117,6 +118,25 @@ def lifecycle(
     callbacks = (on_configure, on_activate, on_deactivate, on_cleanup, on_shutdown, on_error)
     made: "Lifecycle" = borrow("muros.rclc.lifecycles").begin(self, callbacks, services, time)
     return made
+
+
+def parameters(
+    self: "Node",
+    max: int = 4,
+    notify: bool = True,
+    undeclared: bool = False,
+    low_memory: bool = False,
+    longest: int = 49,
+) -> "Parameters":
+    """The parameters of the node, which others see through six services.
+
+    At most ``max`` (0: any number). ``notify`` publishes changes on /parameter_events, ``undeclared`` lets others add
+    parameters, ``longest`` bounds names and descriptions (0: any length). With ``low_memory`` there are no
+    descriptions, and one parameter a request. Needs the types of rcl_interfaces, see docs/parameters.md.
+    """
+    from muros.rclc.parameters import Parameters
+
+    return Parameters(self, max, notify, undeclared, low_memory, longest)
 
 
 def destroy(self: "Node") -> None:
