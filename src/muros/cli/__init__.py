@@ -21,6 +21,7 @@ COMMANDS = {
     "doctor": ("muros.cli.doctor", "say what is wrong with this host and with the graph"),
     "graph": ("muros.cli.graph", "show who talks to whom, as text or as a picture"),
     "service": ("muros.cli.service", "list and call services of the ROS 2 graph"),
+    "lifecycle": ("muros.cli.lifecycle", "show and move managed nodes of the ROS 2 graph"),
 }
 """Sub-commands: the module, which has `run(argv) -> int` or `register(subparsers)` for argparse, and its help."""
 

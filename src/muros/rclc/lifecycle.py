@@ -77,7 +77,7 @@ class Lifecycle:
 
     def asked(self, which: int) -> "Callable[[Any], Any]":
         """The callback of one of the services."""
-        return lambda request: borrow("muros.rclc.lifecycles").answer(self, which, request)
+        return lambda request: borrow("muros.rclc.lifecycle_states").answer(self, which, request)
 
     def destroy(self) -> None:
         """The node takes its services and publishers away itself."""
