@@ -5,7 +5,9 @@ from typing import Any
 
 import pytest
 
+from muros.links.testing import Datagram
 from muros.rtps import EndpointQos, ParticipantLost, Why, inline_qos
+from muros.rtps._wire import AckNack, parse_untrusted
 from muros.space import (
     Appeared,
     Durability,
@@ -516,6 +518,49 @@ class TestDialects:
         net.run(SECOND)
         assert sorted(answers) == [(0, b"waitwait"), (1, b"b...b...")], "each its own, none twice"
         assert sorted(cyclone.heard) == [b"b...", b"wait"]
+
+    def test_a_request_waits_until_cyclone_hears_us(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Its readers skip what was written before the first HEARTBEAT they hear: nothing may be written by then."""
+        net = Net()
+        two = net.computer()
+        answers: list[bytes] = []
+        client = two.space.participant("client").requester(
+            ADD, None, lambda number, data: answers.append(data)
+        )
+        client.send(b"wait")
+        net.run(2 * SECOND)
+        muted = True
+        entity = int.from_bytes(client.gid[12:], "big")
+
+        def mute(datagram: Datagram) -> bool:
+            """The server's reader says nothing yet."""
+            said = parse_untrusted(datagram.data).submessages
+            return not (muted and any(isinstance(each, AckNack) and each.writer == entity for each in said))
+
+        net.world.network.tap = mute
+        server = _CycloneServer(net.stranger(monkeypatch, CYCLONE))
+        out = client.writer.out  # type: ignore[attr-defined]
+        net.until(lambda: out.matched)
+        net.run(100 * MS)
+        assert (client.servers, client.waiting, out.last) == (0, 1, 0)
+        muted = False
+        net.until(lambda: answers)
+        assert (answers, server.heard) == ([b"waitwait"], [b"wait"])
+
+    def test_a_cyclone_that_never_speaks_is_asked_all_the_same(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        net = Net()
+        two = net.computer()
+        client = two.space.participant("client").requester(ADD)
+        client.send(b"wait")
+        entity = int.from_bytes(client.gid[12:], "big")
+
+        def mute(datagram: Datagram) -> bool:
+            said = parse_untrusted(datagram.data).submessages
+            return not any(isinstance(each, AckNack) and each.writer == entity for each in said)
+
+        net.world.network.tap = mute
+        server = _CycloneServer(net.stranger(monkeypatch, CYCLONE))
+        net.until(lambda: server.heard, 2 * SECOND)
 
     def test_a_request_too_short_for_its_header_is_taken_as_it_is(
         self, monkeypatch: pytest.MonkeyPatch

@@ -14,7 +14,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from muros.rtps import Received
+from muros.rtps import Received, guid_of
 from muros.space import _reports
 from muros.space._door import ClosedError
 from muros.space._qos import Qos
@@ -50,6 +50,12 @@ SHIFTED_MOST: Final = 1000
 
 OPEN_MOST: Final = 1000
 """Requests remembered that are not answered yet."""
+
+SILENCE_MOST: Final = 300_000_000
+"""ns after which a server of Cyclone DDS is taken to hear us, though it has said nothing."""
+
+LISTEN_EVERY: Final = 5_000_000
+"""ns between two looks whether it has."""
 
 
 class DdsRequester(EngineRequester):
@@ -139,7 +145,7 @@ class DdsRequester(EngineRequester):
 
     def met(self) -> None:
         """Somebody matches the writer or the reader: there may be a server now."""
-        before, servers = self._servers, _pairs(self.writer.matched, self.reader.matched)
+        before, servers = self._servers, _pairs(self.writer.ready, self.reader.matched)
         self._servers = servers
         if servers > 1 >= before:
             writer = self.writer
@@ -345,20 +351,33 @@ class DdsReplier(EngineReplier):
 
 
 class _RequestWriter(DdsWriter):
-    """Writes the requests of one client."""
+    """Writes the requests of one client.
 
-    __slots__ = ("_requester",)
+    A reader of Cyclone DDS takes the first HEARTBEAT that it hears as the end of what was before it. A request that
+    goes out when we have matched it, but it not us, would be lost for it: it is a server when it has spoken to us.
+    """
+
+    __slots__ = ("_ready", "_requester", "_silent", "_timer")
 
     def __init__(self, participant: DdsParticipant, requester: DdsRequester, qos: Qos, gid: bytes) -> None:
         service = requester.service
         topic = Topic(service.request_topic, service.request_type)
         super().__init__(participant, topic, qos, gid, service.name)
         self._requester = requester
+        self._ready: set[bytes] = set()
+        self._silent: dict[bytes, int] = {}
+        """Those that have not spoken, and when that is overlooked."""
+        self._timer: Timer | None = None
 
     @property
     def carries_requests(self) -> bool:
         """Whether it is a client's."""
         return True
+
+    @property
+    def ready(self) -> tuple[bytes, ...]:
+        """The matched readers to which a request may go."""
+        return tuple(gid for gid in self.matched if gid in self._ready)
 
     def run(self) -> None:
         """There is room again."""
@@ -367,11 +386,42 @@ class _RequestWriter(DdsWriter):
 
     def connected(self, remote: bytes) -> None:
         """A reader of requests matches."""
-        self._requester.met()
+        if self.participant.home.dialect_of(remote) is Dialect.HEADER and self.out.qos.reliable:
+            self._silent[remote] = self.core.timers.now() + SILENCE_MOST
+            self._listen()
+        else:
+            self._ready.add(remote)
+            self._requester.met()
 
     def disconnected(self, remote: bytes) -> None:
         """A reader of requests matches no more."""
+        self._silent.pop(remote, None)
+        self._ready.discard(remote)
         self._requester.left()
+
+    def detach(self) -> None:
+        """Let go of everything held."""
+        super().detach()
+        self._silent.clear()
+        if self._timer is not None:
+            self.core.timers.cancel(self._timer)
+            self._timer = None
+
+    def _listen(self) -> None:
+        """See who has spoken since, or been silent for long enough."""
+        timers = self.core.timers
+        if self._timer is not None:
+            timers.cancel(self._timer)
+            self._timer = None
+        now = timers.now()
+        heard = {guid_of(*proxy.key) for proxy in self.out.core.readers if proxy.count is not None}
+        for remote, until in list(self._silent.items()):
+            if remote in heard or until <= now:
+                del self._silent[remote]
+                self._ready.add(remote)
+        if self._silent:
+            self._timer = timers.at(now + LISTEN_EVERY, self._listen)
+        self._requester.met()
 
 
 class _ReplyReader(DdsReader):
