@@ -67,7 +67,7 @@ class Lifecycle:
     @property
     def state(self) -> str:
         """The label of the state: unconfigured, inactive, active, finalized, or that of a transition that goes on."""
-        label: str = borrow("muros.rclc.lifecycles").label(self.id)
+        label: str = borrow("muros.rclc.lifecycle_states").label(self.id)
         return label
 
     @property
