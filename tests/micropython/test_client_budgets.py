@@ -8,6 +8,7 @@ from tests.micropython.gauge import run_gauge
 from tests.micropython.runtimes import require
 
 
+@pytest.mark.timeout(180)
 @pytest.mark.parametrize(
     "budget", CLIENT_BUDGETS, ids=[budget.what.replace(" ", "-") for budget in CLIENT_BUDGETS]
 )
