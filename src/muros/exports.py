@@ -17,6 +17,9 @@ client.tcp Tcp
 client.timesync TimeSync
 client.uart Uart
 client.udp Udp
+rclc.action_client ActionClient
+rclc.action_server ActionServer
+*rclc.actions GoalError
 rclc.client Client
 rclc.context Context Node
 rclc.errors CapacityError InvalidNameError RclError
@@ -36,6 +39,7 @@ rclc.triggers all_of any_of one
 """
 _ON_HOSTS = """
 client.hosts Session
+rclc.action_hosts ActionClient ActionServer
 rclc.hosts Client Context Executor Node Service Subscription
 rclc.parameter_files ParameterClient
 """

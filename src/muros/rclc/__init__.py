@@ -15,6 +15,9 @@ from muros.compat import MPY, borrow, const
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.client.qos import Qos as Qos
+    from muros.rclc.action_client import ActionClient as ActionClient
+    from muros.rclc.action_server import ActionServer as ActionServer
+    from muros.rclc.actions import GoalError as GoalError
     from muros.rclc.client import Client as Client
     from muros.rclc.context import Context as Context
     from muros.rclc.context import Node as Node

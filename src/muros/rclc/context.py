@@ -68,6 +68,8 @@ class Node:
         timer = node.timer
         service = node.service
         client = node.client
+        action_server = node.action_server
+        action_client = node.action_client
         parameters = node.parameters
         lifecycle = node.lifecycle
         destroy = node.destroy

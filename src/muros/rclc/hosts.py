@@ -28,6 +28,8 @@ from muros.rclc.middleware import _engines, open_url
 if TYPE_CHECKING:
     from muros.client.qos import Qos
     from muros.rclc._types import Publisher as AnyPublisher
+    from muros.rclc.action_hosts import ActionClient, ActionServer
+    from muros.rclc.goals import Goal
     from muros.rclc.lifecycle import Lifecycle
     from muros.rclc.parameters import Parameters
     from muros.rclc.timer import Timer
@@ -175,6 +177,7 @@ class Node(context_.Node):
         made.name = full
         requester = self.context.middleware.requester
         return self._join(made, lambda: requester(self.participant, made.name, kind.TYPE, made.deliver, qos))
+
     def lifecycle(
         self,
         on_configure: Callable[[], object] | None = None,
@@ -192,7 +195,6 @@ class Node(context_.Node):
             if callback is not None:
                 _be_callable(callback, "a callback of a lifecycle")
         return node_.lifecycle(self, *given[:-1], services, time or _now)
-
 
     def parameters(
         self,
@@ -212,6 +214,31 @@ class Node(context_.Node):
         from muros.rclc.parameters import Parameters
 
         return Parameters(self, max, notify, undeclared, low_memory, longest, kind, time.time_ns)
+
+    def action_server(
+        self,
+        kind: Any,
+        name: str,
+        on_execute: Callable[[Goal], Any] | None = None,
+        on_goal: Callable[[Any], object] | None = None,
+        on_cancel: Callable[[Goal], object] | None = None,
+        on_accepted: Callable[[Goal], object] | None = None,
+        goals: int = 100,
+        results: int = 100,
+        result_timeout: float = 10.0,
+        clock: Callable[[], tuple[int, int]] | None = None,
+    ) -> ActionServer:
+        """A server of an action; see ``muros.rclc.node.action_server``. Stamps are of the computer's clock."""
+        from muros.rclc.action_hosts import make_server
+
+        functions = (on_execute, on_goal, on_cancel, on_accepted)
+        return make_server(self, kind, name, functions, (goals, results, result_timeout), clock)
+
+    def action_client(self, kind: Any, name: str, goals: int = 0) -> ActionClient:
+        """A client of an action, with at most ``goals`` on their way (0: any number)."""
+        from muros.rclc.action_hosts import make_client
+
+        return make_client(self, kind, name, goals)
 
     def _join(self, handle: Made, make: Callable[[], Any]) -> Made:
         """Gives a handle its entity; one that cannot be made leaves nothing behind."""

@@ -10,8 +10,11 @@ if TYPE_CHECKING:
 
     from muros.client.qos import Qos
     from muros.rclc._types import Publisher
+    from muros.rclc.action_client import ActionClient
+    from muros.rclc.action_server import ActionServer
     from muros.rclc.client import Client
     from muros.rclc.context import Context, Node
+    from muros.rclc.goals import Goal
     from muros.rclc.lifecycle import Callback, Lifecycle
     from muros.rclc.parameters import Parameters
     from muros.rclc.service import Service
@@ -137,6 +140,49 @@ def parameters(
     from muros.rclc.parameters import Parameters
 
     return Parameters(self, max, notify, undeclared, low_memory, longest)
+
+
+def action_server(
+    self: "Node",
+    kind: "Any",
+    name: str,
+    on_execute: "Callable[[Goal], Any] | None" = None,
+    on_goal: "Callable[[Any], object] | None" = None,
+    on_cancel: "Callable[[Goal], object] | None" = None,
+    on_accepted: "Callable[[Goal], object] | None" = None,
+    goals: int = 4,
+    results: int = 8,
+    result_timeout: float = 10.0,
+    clock: "Callable[[], tuple[int, int]] | None" = None,
+) -> "ActionServer":
+    """A server of an action; see docs/actions.md.
+
+    An executor calls ``on_goal(request)`` and takes the goal if that is true; then ``on_accepted(goal)``, or if there
+    is none ``on_execute(goal)``, whose result ends the goal; it may be a generator that yields seconds. Goals are
+    cancelled when ``on_cancel(goal)`` is true. At most ``goals`` are active; the results of those that have ended are
+    kept for ``result_timeout`` seconds, at most ``results``. ``clock`` gives the time (s, ns) for stamps.
+    """
+    from muros.rclc.action_server import ActionServer
+
+    made = ActionServer(self.context, name)
+    borrow("muros.rclc.actions").make_server(
+        made,
+        self,
+        kind,
+        (on_execute, on_goal, on_cancel, on_accepted),
+        (goals, results, result_timeout),
+        clock,
+    )
+    return made
+
+
+def action_client(self: "Node", kind: "Any", name: str, goals: int = 0) -> "ActionClient":
+    """A client of an action, with at most ``goals`` on their way (0: any number); see docs/actions.md."""
+    from muros.rclc.action_client import ActionClient
+
+    made = ActionClient(self.context, name)
+    borrow("muros.rclc.actions").make_client(made, self, kind, goals)
+    return made
 
 
 def destroy(self: "Node") -> None:
