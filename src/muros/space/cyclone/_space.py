@@ -10,9 +10,9 @@ from xml.sax.saxutils import quoteattr
 
 from muros.findings import Findings
 from muros.rtps import MAX_DOMAIN
-from muros.space._core import Core, Limits
-from muros.space._door import ClosedError, SpaceError
-from muros.space._endpoint import Closing
+from muros.space._core import Limits
+from muros.space._door import SpaceError
+from muros.space._space import EngineSpace
 from muros.space.cyclone._opaque import VERSION, announces_types, installed_version
 from muros.space.dds._view import DdsGraph
 
@@ -30,7 +30,7 @@ NETWORK: Final = ("interfaces", "peers", "range", "network")
 OTHERS: Final = ("ros_distro", "config")
 
 
-class CycloneSpace(Closing):
+class CycloneSpace(EngineSpace):
     """A space in the ROS 2 graph, carried by Cyclone DDS. See `muros.space.Space`."""
 
     def __init__(
@@ -43,15 +43,10 @@ class CycloneSpace(Closing):
         limits: Limits | None = None,
         ros_distro: str | None = None,
     ) -> None:
-        self.domain = domain
-        self.url = f"cyclonedds:{domain}"
-        self.findings = Findings() if findings is None else findings
-        self.clock = clock
-        self.closed = False
+        super().__init__(f"cyclonedds:{domain}", domain, findings, clock, limits, self)
         self._config = config
         self._ros_distro = ros_distro
         self._domains: dict[int, CycloneDomain] = {}
-        self._core = Core(clock, self.findings, limits or Limits(), self)
         # The books have the shape of those of the dds engine.
         self.graph = DdsGraph(self._core, cast(Any, self._domains), domain)
         if announces_types():
@@ -63,11 +58,6 @@ class CycloneSpace(Closing):
                 f"only in version {VERSION} that can be helped",
                 remedy=f"Install cyclonedds=={VERSION}, or use dds:",
             )
-
-    @property
-    def limits(self) -> Limits:
-        """The bounds it keeps."""
-        return self._core.limits
 
     def participant(
         self,
@@ -82,14 +72,12 @@ class CycloneSpace(Closing):
         """A new participant."""
         from muros.space.cyclone._participant import CycloneParticipant
 
-        if self.closed:
-            raise ClosedError("the space is closed; open another one")
+        self.check_open()
         if key == b"":
             raise ValueError("the key of a participant is empty; leave it out, or give at least one byte")
         home = self._home(self.domain if domain is None else domain)
         holder = next((p for p in home.participants.values() if key is not None and p.key == key), None)
-        if holder is not None:
-            raise ValueError(f"key {key!r} is in use by {holder.owner}; close it first, or take another key")
+        self.check_free(key, holder)
         made = CycloneParticipant(self._core, home, name, namespace, enclave, owner, key)
         home.join(made)
         self._core.settle()
@@ -97,20 +85,11 @@ class CycloneSpace(Closing):
 
     def attach(self, loop: asyncio.AbstractEventLoop) -> None:
         """Serve the space on this loop from now on."""
-        if self.closed:
-            raise ClosedError("the space is closed; open another one")
+        self.check_open()
         if self._core.driver.attach(loop):
             self._home(self.domain)
             for home in self._domains.values():
                 home.attach(loop)
-
-    def tick(self) -> int | None:
-        """Do what has become due. Returns when to call again, None = when asked to."""
-        return None if self.closed else self._core.tick()
-
-    def on_wake(self, callback: Callable[[], object] | None) -> None:
-        """Call `callback` when `tick` is needed earlier than it said."""
-        self._core.on_wake = callback
 
     def close(self) -> None:
         """Close every participant; all others are told."""

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 from muros import __version__
 from muros.findings import Findings
 from muros.rtps import MAX_DOMAIN, DomainReport
-from muros.space._core import Core, Limits
-from muros.space._door import ClosedError, SpaceError
-from muros.space._endpoint import Closing
+from muros.space._core import Limits
+from muros.space._door import SpaceError
 from muros.space._participant import prefix_of, prefixes
+from muros.space._space import EngineSpace
 from muros.space.dds._discovery_info import NEW_DISTROS, OLD_DISTROS
 from muros.space.dds._domain import Carrier, DdsDomain
 from muros.space.dds._participant import DdsParticipant
@@ -38,7 +38,7 @@ CarrierFactory: TypeAlias = Callable[[int, Findings, Callable[[DomainReport], No
 """Makes what carries a domain of that number, given where to tell of faults of the network and of others."""
 
 
-class DdsSpace(Closing):
+class DdsSpace(EngineSpace):
     """A space in the ROS 2 graph. See `muros.space.Space`."""
 
     def __init__(
@@ -51,24 +51,14 @@ class DdsSpace(Closing):
         limits: Limits | None = None,
         ros_distro: str | None = None,
     ) -> None:
-        self.domain = domain
-        self.url = f"dds:{domain}"
-        self.findings = Findings() if findings is None else findings
-        self.clock = clock
-        self.closed = False
+        super().__init__(f"dds:{domain}", domain, findings, clock, limits, self)
         self._domains: dict[int, DdsDomain] = {}
-        self._core = Core(clock, self.findings, limits or Limits(), self)
         self._carrier = carrier
         self._ros_distro = ros_distro
         seed = _seed()
         self._salt = seed
         self._next_prefix = prefixes(seed)
         self.graph = DdsGraph(self._core, self._domains, domain)
-
-    @property
-    def limits(self) -> Limits:
-        """The bounds it keeps."""
-        return self._core.limits
 
     def participant(
         self,
@@ -81,13 +71,11 @@ class DdsSpace(Closing):
         owner: str = "",
     ) -> DdsParticipant:
         """A new participant."""
-        if self.closed:
-            raise ClosedError("the space is closed; open another one")
+        self.check_open()
         number = self.domain if domain is None else domain
         prefix = self._next_prefix() if key is None else self._prefix_of(key)
         home = self._home(number)
-        if (holder := home.participants.get(prefix)) is not None:
-            raise ValueError(f"key {key!r} is in use by {holder.owner}; close it first, or take another key")
+        self.check_free(key, home.participants.get(prefix))
         with home.making():
             made = DdsParticipant(self._core, home, prefix, name, namespace, enclave, owner, key is not None)
             home.join(made)
@@ -96,8 +84,7 @@ class DdsSpace(Closing):
 
     def attach(self, loop: asyncio.AbstractEventLoop) -> None:
         """Go on the network, and serve the space on this loop from now on."""
-        if self.closed:
-            raise ClosedError("the space is closed; open another one")
+        self.check_open()
         if self._core.driver.loop is not None:
             self._core.driver.attach(loop)  # says so if it is another one
             return
@@ -105,14 +92,6 @@ class DdsSpace(Closing):
         for home in self._domains.values():
             self._open(home, loop)
         self._core.driver.attach(loop)
-
-    def tick(self) -> int | None:
-        """Do what has become due. Returns when to call again, None = when asked to."""
-        return None if self.closed else self._core.tick()
-
-    def on_wake(self, callback: Callable[[], object] | None) -> None:
-        """Call `callback` when `tick` is needed earlier than it said."""
-        self._core.on_wake = callback
 
     def close(self) -> None:
         """Close every participant; all others are told."""

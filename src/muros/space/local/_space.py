@@ -8,10 +8,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from muros.findings import Findings
-from muros.space._core import Core, Limits
-from muros.space._door import ClosedError, SpaceError
-from muros.space._endpoint import Closing
+from muros.space._core import Limits
+from muros.space._door import SpaceError
 from muros.space._participant import prefix_of, prefixes
+from muros.space._space import EngineSpace
 from muros.space.local._participant import Domain, LocalParticipant
 from muros.space.local._view import LocalGraph
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["LocalSpace", "open_local"]
 
 
-class LocalSpace(Closing):
+class LocalSpace(EngineSpace):
     """A space of one process. See `muros.space.Space`."""
 
     def __init__(
@@ -32,20 +32,10 @@ class LocalSpace(Closing):
         clock: Callable[[], int] = time.time_ns,
         limits: Limits | None = None,
     ) -> None:
-        self.domain = domain
-        self.url = f"local:{domain}" if domain else "local:"
-        self.findings = Findings() if findings is None else findings
-        self.clock = clock
-        self.closed = False
-        self._core = Core(clock, self.findings, limits or Limits())
+        super().__init__(f"local:{domain}" if domain else "local:", domain, findings, clock, limits)
         self._domains: dict[int, Domain] = {}
         self._next_prefix = prefixes(os.urandom(8))
         self.graph = LocalGraph(self._core, self._domains, domain)
-
-    @property
-    def limits(self) -> Limits:
-        """The bounds it keeps."""
-        return self._core.limits
 
     def participant(
         self,
@@ -58,8 +48,7 @@ class LocalSpace(Closing):
         owner: str = "",
     ) -> LocalParticipant:
         """A new participant."""
-        if self.closed:
-            raise ClosedError("the space is closed; open another one")
+        self.check_open()
         number = self.domain if domain is None else domain
         home = self._domains.get(number)
         if home is None:
@@ -67,23 +56,13 @@ class LocalSpace(Closing):
                 del self._domains[empty]
             home = self._domains[number] = Domain(number)
         prefix = self._next_prefix() if key is None else prefix_of(key)
-        if (holder := home.participants.get(prefix)) is not None:
-            raise ValueError(f"key {key!r} is in use by {holder.owner}; close it first, or take another key")
+        self.check_free(key, home.participants.get(prefix))
         return LocalParticipant(self._core, home, prefix, name, namespace, enclave, owner)
 
     def attach(self, loop: asyncio.AbstractEventLoop) -> None:
         """Serve the space on this loop from now on."""
-        if self.closed:
-            raise ClosedError("the space is closed; open another one")
+        self.check_open()
         self._core.driver.attach(loop)
-
-    def tick(self) -> int | None:
-        """Do what has become due. Returns when to call again, None = when asked to."""
-        return None if self.closed else self._core.tick()
-
-    def on_wake(self, callback: Callable[[], object] | None) -> None:
-        """Call `callback` when `tick` is needed earlier than it said."""
-        self._core.on_wake = callback
 
     def close(self) -> None:
         """Close every participant."""
