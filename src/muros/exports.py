@@ -40,7 +40,7 @@ rclc.triggers all_of any_of one
 _ON_HOSTS = """
 client.hosts Session
 rclc.action_hosts ActionClient ActionServer
-rclc.hosts Client Context Executor Node Service Subscription
+rclc.hosts Client Context Executor GuardCondition Node Service Subscription
 rclc.parameter_files ParameterClient
 """
 

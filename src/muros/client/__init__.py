@@ -10,6 +10,7 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.client.custom import Custom as Custom
     from muros.client.discovery import discover as discover
+    from muros.client.hosts import Session as Session
     from muros.client.link import CONNECTED as CONNECTED
     from muros.client.link import CONNECTING as CONNECTING
     from muros.client.link import LOST as LOST
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from muros.client.presence import ping as ping
     from muros.client.qos import Qos as Qos
     from muros.client.serial import Serial as Serial
-    from muros.client.session import Session as Session
     from muros.client.tcp import Tcp as Tcp
     from muros.client.timesync import TimeSync as TimeSync
     from muros.client.uart import Uart as Uart

@@ -18,14 +18,16 @@ if TYPE_CHECKING:
     from muros.rclc.action_client import ActionClient as ActionClient
     from muros.rclc.action_server import ActionServer as ActionServer
     from muros.rclc.actions import GoalError as GoalError
-    from muros.rclc.client import Client as Client
-    from muros.rclc.context import Context as Context
-    from muros.rclc.context import Node as Node
     from muros.rclc.errors import CapacityError as CapacityError
     from muros.rclc.errors import InvalidNameError as InvalidNameError
     from muros.rclc.errors import RclError as RclError
-    from muros.rclc.executor import Executor as Executor
-    from muros.rclc.guard import GuardCondition as GuardCondition
+    from muros.rclc.hosts import Client as Client
+    from muros.rclc.hosts import Context as Context
+    from muros.rclc.hosts import Executor as Executor
+    from muros.rclc.hosts import GuardCondition as GuardCondition
+    from muros.rclc.hosts import Node as Node
+    from muros.rclc.hosts import Service as Service
+    from muros.rclc.hosts import Subscription as Subscription
     from muros.rclc.illegal import TransitionError as TransitionError
     from muros.rclc.lifecycle import Lifecycle as Lifecycle
     from muros.rclc.lifecycle_client import LifecycleClient as LifecycleClient
@@ -37,8 +39,6 @@ if TYPE_CHECKING:
     from muros.rclc.parameter_errors import ParameterTypeError as ParameterTypeError
     from muros.rclc.parameters import Parameter as Parameter
     from muros.rclc.parameters import Parameters as Parameters
-    from muros.rclc.service import Service as Service
-    from muros.rclc.subscription import Subscription as Subscription
     from muros.rclc.timer import Timer as Timer
     from muros.rclc.triggers import all_of as all_of
     from muros.rclc.triggers import any_of as any_of

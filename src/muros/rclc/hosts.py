@@ -19,6 +19,7 @@ from muros.rclc import client as client_
 from muros.rclc import context as context_
 from muros.rclc import contexts, handles
 from muros.rclc import executor as executor_
+from muros.rclc import guard as guard_
 from muros.rclc import node as node_
 from muros.rclc import service as service_
 from muros.rclc import subscription as subscription_
@@ -389,6 +390,23 @@ class Client(client_.Client):
                 "Use send(request, on_reply) and an executor."
             )
         return handles.call(self, request, timeout)
+
+
+class GuardCondition(guard_.GuardCondition):
+    """See ``muros.rclc.guard.GuardCondition``."""
+
+    context: Context
+
+    def trigger(self) -> None:
+        """Makes it ready, from any thread.
+
+        An executor that waits straight in a data space wakes at once; one that waits for an agent within the time
+        until it would look again by itself, at most ``keepalive``.
+        """
+        super().trigger()
+        wake = getattr(self.context.middleware, "wake", None)
+        if wake is not None:
+            wake()
 
 
 class Executor(executor_.Executor):
