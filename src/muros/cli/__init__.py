@@ -20,6 +20,7 @@ COMMANDS = {
     "node": ("muros.cli.node", "list and show nodes of the ROS 2 graph"),
     "doctor": ("muros.cli.doctor", "say what is wrong with this host and with the graph"),
     "graph": ("muros.cli.graph", "show who talks to whom, as text or as a picture"),
+    "action": ("muros.cli.action", "list actions of the ROS 2 graph and send goals to them"),
     "service": ("muros.cli.service", "list and call services of the ROS 2 graph"),
     "lifecycle": ("muros.cli.lifecycle", "show and move managed nodes of the ROS 2 graph"),
 }

@@ -1,0 +1,122 @@
+"""Actions of programs and of rclpy, both ways, and `muros action` on those of rclpy."""
+
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from muros import interfaces
+from muros.rclc import Context, Executor
+from tests.dds.peers import Peer, require, start
+from tests.rclc_space.ways import PATIENCE
+
+TYPE = "test_msgs/action/Fibonacci"
+FIBONACCI = "int32 order\n---\nint32[] sequence\n---\nint32[] sequence\n"
+SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
+
+
+@pytest.fixture(scope="module", params=["jazzy", "kilted"])
+def ros(request: pytest.FixtureRequest) -> Iterator[Peer]:
+    """A ROS 2 process."""
+    require(request.param)
+    with start(request.param, discovery="localhost") as peer:
+        yield peer
+
+
+@pytest.fixture(scope="module")
+def kind(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The action of the peers' tests."""
+    folder = tmp_path_factory.mktemp("types") / "test_msgs/action"
+    folder.mkdir(parents=True)
+    (folder / "Fibonacci.action").write_text(FIBONACCI)
+    interfaces.add_path(folder.parent)
+    return interfaces.action(TYPE)
+
+
+@pytest.fixture
+def context(dds_url: str, ros: Peer) -> Iterator[Context]:
+    """A context of ours."""
+    made = Context(dds_url)
+    yield made
+    made.close()
+    ros.do("reset")
+
+
+def test_rclpy_sends_goals_to_us(context: Context, ros: Peer, kind: Any, dds_url: str) -> None:
+    def run(goal: Any) -> Iterator[float]:
+        sequence = [0, 1]
+        for _ in range(abs(goal.request.order)):
+            if goal.canceling:
+                goal.canceled(kind.Result(sequence=sequence))
+                return
+            sequence.append(sequence[-1] + sequence[-2])
+            goal.feedback(kind.Feedback(sequence=sequence))
+            yield 0.02
+        result = kind.Result(sequence=sequence)
+        goal.abort(result) if goal.request.order < 0 else goal.succeed(result)
+
+    context.node("counter", "lab").action_server(
+        kind, "count", run, on_goal=lambda goal: goal.order != 13, on_cancel=lambda goal: True
+    )
+    ended = threading.Event()
+
+    def spin() -> None:
+        executor = Executor(context)
+        while not ended.is_set():
+            executor.spin_some(0.1)
+
+    thread = threading.Thread(target=spin, daemon=True)
+    thread.start()
+    try:
+        node = ros.do("node", name="asker", domain=int(dds_url.partition(":")[2]))
+        client = ros.do("action_client", node=node, name="/lab/count", type=TYPE)
+        states = ros.do(
+            "subscription",
+            node=node,
+            topic="/lab/count/_action/status",
+            type="action_msgs/msg/GoalStatusArray",
+            qos={"depth": 50, "durability": "transient_local"},
+        )
+        outcome = ros.do("goal", client=client, goal={"order": 6})
+        assert outcome["status"] == SUCCEEDED
+        assert outcome["result"] == {"sequence": [0, 1, 1, 2, 3, 5, 8, 13]}
+        assert [len(piece["sequence"]) for piece in outcome["feedback"]] == [3, 4, 5, 6, 7, 8]
+        assert ros.do("goal", client=client, goal={"order": 13}) == {"accepted": False}
+        assert ros.do("goal", client=client, goal={"order": -2})["status"] == ABORTED
+        outcome = ros.do("goal", client=client, goal={"order": 10000}, cancel_after=2)
+        assert (outcome["cancelled"], outcome["status"]) == (1, CANCELED)
+        arrays = ros.do("take", subscription=states, count=8, wait=PATIENCE)
+        seen = [[entry["status"] for entry in array["status_list"]] for array in arrays]
+        assert seen[-1] == [SUCCEEDED, ABORTED, CANCELED]
+    finally:
+        ended.set()
+        thread.join(PATIENCE)
+
+
+def test_we_send_goals_to_rclpy(context: Context, ros: Peer, kind: Any, dds_url: str) -> None:
+    node = ros.do("node", name="counter", domain=int(dds_url.partition(":")[2]))
+    ros.do("action_server", node=node, name="/count", type=TYPE, period=0.02)
+    client = context.node("asker").action_client(kind, "/count")
+    heard: list[int] = []
+    goal = client.call(
+        kind.Goal(order=5),
+        timeout=PATIENCE,
+        on_feedback=lambda goal, piece: heard.append(len(piece.sequence)),
+    )
+    assert goal is not None
+    assert (goal.accepted, goal.status) == (True, SUCCEEDED)
+    assert list(goal.result.sequence) == [0, 1, 1, 2, 3, 5, 8]
+    assert heard[-3:] == [5, 6, 7]
+    answers: list[bool | None] = []
+
+    def cancel(goal: Any, piece: Any) -> None:
+        if len(piece.sequence) == 4:
+            goal.cancel(lambda goal, canceling: answers.append(canceling))
+
+    goal = client.call(kind.Goal(order=500), timeout=PATIENCE, on_feedback=cancel)
+    assert goal is not None
+    assert answers == [True]
+    assert goal.status == CANCELED
+    assert list(goal.result.sequence)[:4] == [0, 1, 1, 2]
+    assert client.goals == []
