@@ -29,7 +29,7 @@ from muros.rtps import (
 )
 from muros.rtps._constants import ENTITYID_SPDP_READER, ENTITYID_SPDP_WRITER
 from muros.rtps._discovery_data import ParticipantData, departure
-from muros.rtps._wire import data, message
+from muros.rtps._wire import Data, data, message, parse_untrusted
 from tests.rtps.domains import GROUP, MS, SECOND, Process, World, of, payload
 
 
@@ -197,6 +197,26 @@ def test_many_readers_at_one_place_get_one_datagram() -> None:
     ] * 5
 
 
+def test_processes_of_many_participants_meet_with_few_datagrams() -> None:
+    world, left, right = pair()
+    for number in range(20):
+        talker, listener = left.participant(), right.participant()
+        for topic in range(5):
+            left.writer(talker, f"rt/{number}/{topic}")
+            right.reader(listener, f"rt/{number}/{topic}")
+    sent = world.record()
+    world.run(2 * SECOND)
+    for process in (left, right):
+        for participant in process.core.participants:
+            assert len(participant.endpoints) == 39 * 5
+            assert all(local.matched for local in participant.locals())
+    assert len(sent) < 3600  # 400 pairs, each with three topics of discovery each way
+    assert max(len(datagram.data) for datagram in sent) <= 1400
+    # Those who speak in the datagrams of others are alive, too.
+    world.run(60 * SECOND)
+    assert all(len(p.participants) == 39 for process in (left, right) for p in process.core.participants)
+
+
 # --- Parting ---------------------------------------------------------------------------------------------
 
 
@@ -289,6 +309,95 @@ def test_one_that_comes_back_is_understood_by_those_who_missed_its_farewell() ->
         talker.close(left.now)
         world.run(10 * MS)
         world.network.loss = 0.0
+
+
+@pytest.mark.parametrize("back", [0, 500])
+def test_one_that_alone_has_forgotten_the_other_meets_it_again(back: int) -> None:
+    """Messages get lost in one direction only, for longer than the lease. `back`: its counts begin so much lower."""
+    world, left, right = pair()
+    talker, listener = left.participant(), right.participant()
+    qos = EndpointQos(durability=Durability.TRANSIENT_LOCAL, depth=10)
+    writer, reader = left.writer(talker, qos=qos), right.reader(listener, qos=qos)
+    world.run(10 * SECOND)
+    writer.write(payload(1), left.now)
+    world.run(SECOND)
+    world.network.tap = lambda datagram: datagram.sender != left.meta
+    world.run(25 * SECOND)
+    assert not listener.participants
+    assert writer.matched == (reader.guid,)
+    world.network.tap = None
+    for core in (left.core, right.core):
+        for participant in core.participants:
+            for port in participant._discovery._writers.values():
+                for proxy in port.core.readers:
+                    proxy.count = (proxy.count or 0) + back
+    world.run(6 * SECOND)
+    assert reader.matched == (writer.guid,)
+    writer.write(payload(2), left.now)
+    world.run(SECOND)
+    assert right.got[reader.guid][-1].payload == payload(2)
+
+
+def test_one_that_comes_back_at_once_waits_until_all_have_been_told_that_it_had_gone() -> None:
+    world, left, right = pair()
+    listener = right.participant()
+    prefix = b"the same one"
+    first = left.participant(prefix=prefix)
+    left.writer(first, "rt/old")
+    sibling = left.participant()
+    world.run(SECOND)
+    sent = world.record()
+    start = world.network.now
+    first.close(left.now)
+    again = left.participant(prefix=prefix, user_data=b"again")
+    own = left.reader(sibling, "rt/new")
+    writer = left.writer(again, "rt/new")
+    assert writer.matched == (own.guid,)  # within the process it is there
+    world.run(SECOND)
+    told = [
+        (int((datagram.sent_at - start) / MS), event.sequence, bool(event.payload))
+        for datagram in sent
+        if datagram.receiver == right.meta
+        for event in parse_untrusted(datagram.data).submessages
+        if isinstance(event, Data) and event.source == prefix and event.writer == ENTITYID_SPDP_WRITER
+    ]
+    assert [(at, alive) for at, _, alive in told][:4] == [(0, False), (30, False), (60, False), (100, True)]
+    numbers = [number for _, number, _ in told]
+    assert numbers == sorted(numbers)
+    assert len(set(numbers)) == 4
+    assert [endpoint.topic for endpoint in listener.endpoints if endpoint.is_writer] == ["rt/new"]
+    lost, found = (
+        of(right.events[listener.prefix], ParticipantLost),
+        of(right.events[listener.prefix], ParticipantFound),
+    )
+    assert len(lost) == 1
+    assert [each.participant.user_data for each in found if each.participant.prefix == prefix] == [
+        b"",
+        b"again",
+    ]
+
+
+def test_one_that_comes_back_and_goes_at_once_is_not_seen() -> None:
+    world, left, right = pair()
+    listener = right.participant()
+    prefix = b"the same one"
+    left.participant()
+    for _ in range(5):
+        left.participant(prefix=prefix).close(left.now)
+    world.run(SECOND)
+    assert len(listener.participants) == 1
+    back = left.participant(prefix=prefix)
+    for _ in range(5):
+        back.close(left.now)
+        back = left.participant(prefix=prefix)
+        back.set_user_data(b"changed", left.now)
+        left.core.set_addresses(left.addresses, left.now)
+        stranger = right.participant()
+        world.run(20 * MS)
+        stranger.close(right.now)
+    world.run(SECOND)
+    assert [each.user_data for each in listener.participants if each.prefix == prefix] == [b"changed"]
+    assert back.participants
 
 
 def test_nothing_is_left_behind() -> None:

@@ -33,7 +33,7 @@ class Town:
         for _ in range(processes):
             process = self.world.process()
             for _ in range(participants):
-                participant = process.participant(lease=5 * SECOND)
+                participant = process.participant(lease=10 * SECOND)
                 for topic in range(topics):
                     if self.draw.random() < 0.6:
                         writer = process.writer(
@@ -131,7 +131,7 @@ def test_a_network_that_parts_and_heals(seed: int) -> None:
     town.world.network.partition(
         *[[endpoint.address for process in side for endpoint in process.endpoints] for side in sides]
     )
-    town.world.run(8 * SECOND)
+    town.world.run(13 * SECOND)
     for side in sides:
         for process in side:
             for participant in process.core.participants:

@@ -115,8 +115,8 @@ class Announcer(Timed):
         """Announce it to one alone."""
         self._announce(peer.discovery)
 
-    def leave(self) -> None:
-        """The participant goes."""
+    def leave(self, *, again: bool = False) -> None:
+        """The participant goes. again: it has gone, and those known are told once more."""
         self._sequence = self._number()
         content = data_submessage(
             ENTITYID_SPDP_READER,
@@ -125,7 +125,7 @@ class Announcer(Timed):
             b"",
             inline_qos=departure(self._data.guid),
         )
-        for place in self._peers() | dict.fromkeys(self.announce_to):
+        for place in self._peers() if again else self._peers() | dict.fromkeys(self.announce_to):
             self._send([content], None, place)
 
     def _peers(self) -> dict[Locator, None]:

@@ -95,7 +95,7 @@ class Discovery(Timed):
         self._readers: dict[EntityId, ReaderPort] = {}
         self._paused: dict[GuidPrefix, None] = {}
         settings = self._domain.settings
-        send = self._domain.gatherer(owner.send)
+        send = self._domain.gatherer(owner.prefix, owner.send)
         lasts = self._domain.lasts(owner.prefix) or (0,) * len(_WRITERS)
         for (writer, reader, _, _), last in zip(_WRITERS, lasts, strict=True):
             writing = self._writers[writer] = WriterPort(

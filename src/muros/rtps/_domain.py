@@ -16,6 +16,7 @@ What comes from outside with the prefix of a participant of ours is an echo (mul
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, Final
 
 from muros.rtps._agenda import Agenda
@@ -24,6 +25,7 @@ from muros.rtps._discovery_data import EndpointData, InvalidDiscoveryData, Parti
 from muros.rtps._domain_settings import DOMAIN_DEFAULTS, NOWHERE, Addresses, DomainSettings, Transmit
 from muros.rtps._endpoint import MILLISECOND, SECOND, Send
 from muros.rtps._events import AckNack, Data, Event, InfoReply, InvalidMessage, NackFrag
+from muros.rtps._farewell import Farewell
 from muros.rtps._gather import Gather
 from muros.rtps._liveliness import WriterLease
 from muros.rtps._news import DomainProblem, DomainReport, ParticipantEvent, Why
@@ -89,15 +91,18 @@ class DomainCore:
         self.registry = Registry()
         self.inside: deque[bytes] = deque()
         self.news: deque[tuple[Callable[[Any], object], Any]] = deque()
-        self.gathered: dict[Gather, None] = {}
         self._transmit = transmit
+        self._gather = Gather(self._count_and_transmit)
+        self.gathered: Final = self._gather.pending
         self._report = report
         self._participants: dict[GuidPrefix, ParticipantCore] = {}
         self._routes: dict[_Key, Route] = {}
         self._writers: dict[_Key, WriterPort] = {}
         self._replies: dict[_Key, tuple[WriterPort, ...]] = {}
         self._reply: tuple[GuidPrefix, Locator] | None = None
+        self._farewells: dict[GuidPrefix, Farewell] = {}
         self._lead: ParticipantCore | None = None
+        self._soon = False
         self._number = 0
         self._lives: dict[GuidPrefix, tuple[int, ...]] = {}
         self._parsed: dict[bytes, EndpointData] = {}
@@ -158,8 +163,10 @@ class DomainCore:
         )
         made = ParticipantCore(self, data, on_event, now)
         self._participants[prefix] = made
-        made.start(now)
-        self._choose_lead(now)
+        if prefix in self._farewells:
+            made.held = True
+        else:
+            self._start(made, now)
         self.finish()
         return made
 
@@ -170,6 +177,10 @@ class DomainCore:
         self.busy = True
         try:
             self._hear(datagram, source, now)
+            if self._soon:
+                # What readers of our discovery miss leaves before users write to those that were just matched.
+                self._soon = False
+                self.agenda.run(now)
         finally:
             self.busy = False
         if self.inside or self.news or self.gathered:
@@ -199,9 +210,11 @@ class DomainCore:
 
     def close(self, now: int) -> None:
         """Close all participants."""
+        self.now = now
         for participant in tuple(self._participants.values()):
-            participant.close(now)
+            self.close_participant(participant, now)
         self.closed = True
+        self.finish()
 
     # --- What its participants do ------------------------------------------------------------------------
 
@@ -216,19 +229,22 @@ class DomainCore:
         self.busy = True
         try:
             while True:
-                if news:
+                if self.gathered:
+                    self._gather.flush()  # discovery goes before what users write when they learn of it
+                elif news:
                     callback, event = news.popleft()
                     callback(event)
                 elif inside and turn:
                     turn -= 1
                     self._hear(inside.popleft(), INSIDE, self.now)
-                elif self.gathered:
-                    gather, _ = self.gathered.popitem()
-                    gather.flush()
                 else:
                     break
         finally:
             self.busy = False
+
+    def _count_and_transmit(self, datagram: bytes, place: Locator) -> None:
+        self.counters["sent"] += 1
+        self._transmit(datagram, place)
 
     def later(self, callback: Callable[[], object]) -> None:
         """Call this when the work of the present call is done."""
@@ -256,16 +272,15 @@ class DomainCore:
 
         return send
 
-    def gatherer(self, send: Send) -> Send:
-        """What the cores of a participant's discovery send through."""
-        gather, gathered = Gather(send), self.gathered
+    def gatherer(self, prefix: GuidPrefix, send: Send) -> Send:
+        """What discovery of a participant sends through, where `send` would send at once."""
+        gather, others = self._gather, self.others
 
         def collect(submessages: list[bytes], destination: GuidPrefix | None, place: Any) -> None:
             if self._reply is not None and self._reply[0] == destination:
                 send(submessages, destination, place)
             else:
-                gathered[gather] = None
-                gather(submessages, destination, place)
+                gather.add(prefix, submessages, destination, place, place in others.kin)
 
         return collect
 
@@ -351,9 +366,16 @@ class DomainCore:
 
     def close_participant(self, participant: ParticipantCore, now: int) -> None:
         """Its owner takes it away."""
+        prefix = participant.prefix
+        was_there = not participant.held
         participant.stop(now)
-        del self._participants[participant.prefix]
-        self._choose_lead(now)
+        del self._participants[prefix]
+        if was_there:
+            self._choose_lead(now)
+            if self.peers:
+                farewell = Farewell(participant.say_farewell, partial(self._come_back, prefix), now)
+                self._farewells[prefix] = farewell
+                self.agenda.at(farewell, farewell.begin)
 
     def refuse(
         self, problem: DomainProblem, prefix: GuidPrefix, text: str, number: int | None = None
@@ -409,9 +431,12 @@ class DomainCore:
         event: Any  # of many kinds, told apart by `kind`
         for event in content.submessages:
             said_by, kind = event.source, type(event)
-            if outside and said_by is not prefix and said_by in self._participants:
-                self.counters["echoes"] += 1
-                continue
+            if outside and said_by is not prefix:
+                if said_by in self._participants:
+                    self.counters["echoes"] += 1
+                    continue
+                if (other := self.peers.get(said_by)) is not None:
+                    other.seen = now
             handle = FOR_READERS.get(kind)
             if handle is not None:
                 route = routes.get((said_by, event.writer))
@@ -453,6 +478,7 @@ class DomainCore:
                     port.core.on_nack_frag(event, now)
                 if port.core.due < port.wake_at:
                     self.agenda.at(port, port.core.due)
+                self._soon |= port.core.due <= now
         if not handled:
             self.counters["unmatched"] += 1
 
@@ -499,9 +525,20 @@ class DomainCore:
 
     # --- Helpers -----------------------------------------------------------------------------------------
 
+    def _start(self, participant: ParticipantCore, now: int) -> None:
+        participant.start(now)
+        self._choose_lead(now)
+
+    def _come_back(self, prefix: GuidPrefix, now: int) -> None:
+        """The farewell of a participant is over: if it is here again, others may see it."""
+        del self._farewells[prefix]
+        participant = self._participants.get(prefix)
+        if participant is not None:
+            self._start(participant, now)
+
     def _choose_lead(self, now: int) -> None:
         """The participant that has been here longest announces itself to those not known yet."""
-        lead = next(iter(self._participants.values()), None)
+        lead = next((each for each in self._participants.values() if not each.held), None)
         if lead is not self._lead:
             self._lead = lead
             if lead is not None:

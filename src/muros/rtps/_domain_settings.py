@@ -66,7 +66,9 @@ class DomainSettings:
     writer: WriterSettings = WRITER_DEFAULTS
     reader: ReaderSettings = READER_DEFAULTS
     discovery_writer: WriterSettings = field(
-        default_factory=lambda: WriterSettings(fragment_size=1300, heartbeat_period=100 * MILLISECOND)
+        default_factory=lambda: WriterSettings(
+            fragment_size=1300, heartbeat_period=100 * MILLISECOND, together=True
+        )
     )
     """Of the writers that tell of endpoints; one datagram of theirs has to pass every network."""
     discovery_reader: ReaderSettings = field(default_factory=lambda: ReaderSettings(memory=8 << 20))

@@ -11,13 +11,16 @@ from typing import Final, Protocol, TypeAlias
 
 from muros.rtps._values import Guid, GuidPrefix
 
-__all__ = ["MILLISECOND", "NEVER", "SECOND", "Place", "Problem", "Report", "Send", "newer"]
+__all__ = ["MILLISECOND", "NEVER", "SECOND", "Place", "Problem", "Report", "Send", "first_count", "newer"]
 
 MILLISECOND: Final = 10**6
 """In ns, the unit of all times here."""
 
 SECOND: Final = 10**9
 """In ns."""
+
+COUNT_UNIT: Final = 10 * MILLISECOND
+"""Counts rise more slowly than this in the long run."""
 
 NEVER: Final = 2**63
 """A time that does not come."""
@@ -60,6 +63,14 @@ class Report(Protocol):
 
     def __call__(self, problem: Problem, peer: Guid, number: int, /) -> object:
         """`peer`: the GUID of the reader or writer at the other end."""
+
+
+def first_count(now: int) -> int:
+    """Where the counts of a writer or reader begin that begins at `now`.
+
+    They follow the clock, since peers may remember those of an earlier life of the same GUID.
+    """
+    return now // COUNT_UNIT & 0x3FFFFFFF
 
 
 def newer(count: int, than: int | None) -> bool:

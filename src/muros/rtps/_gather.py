@@ -1,48 +1,83 @@
-"""Submessages of a participant for one place, gathered while a call does its work, and sent together at its end.
+"""Submessages for one place, gathered while a call does its work, and sent together at its end.
 
-Discovery with a process of many participants is many small submessages to one place. Each brings its destination.
+Discovery between processes of many participants is many small submessages to one place. Each brings its destination.
+Where the other side is of this kind, too, those of several participants of ours share a datagram: INFO_SRC says whose
+the next ones are (DDSI-RTPS 2.3, 8.3.7.9). Others get a message of one participant, which all of them understand.
 """
 
-from typing import Any, Final
+from collections.abc import Callable
+from typing import Final
 
-from muros.rtps._endpoint import Place, Send
-from muros.rtps._values import GuidPrefix
-from muros.rtps._wire import info_dst
+from muros.rtps._values import GuidPrefix, Locator
+from muros.rtps._wire import info_dst, info_src, message
 
 __all__ = ["Gather"]
 
 SIZE: Final = 1300
 """Bytes that are sent together; what is larger goes alone."""
 
-_EVERYBODY: Final = info_dst(bytes(12))
+EVERYBODY: Final = bytes(12)
+"""As destination: whoever listens."""
+
+INFO_SIZE: Final = 40
+"""Bytes that say whose a submessage is, and for whom."""
 
 
 class Gather:
-    """Stands before a `Send`; `flush` lets go what has been gathered."""
+    """Sends through `transmit`. `pending` is what has been gathered since the last `flush`."""
 
-    __slots__ = ("_pending", "_send", "_sizes")
+    __slots__ = ("_transmit", "pending")
 
-    def __init__(self, send: Send) -> None:
-        self._send = send
-        self._pending: dict[Place, list[bytes]] = {}
-        self._sizes: dict[Place, int] = {}
+    def __init__(self, transmit: Callable[[bytes, Locator], object]) -> None:
+        self._transmit = transmit
+        self.pending: dict[tuple[GuidPrefix, Locator], _Bundle] = {}
 
-    def __call__(self, submessages: list[bytes], destination: GuidPrefix | None, place: Any) -> None:
-        size = sum(map(len, submessages)) + len(_EVERYBODY)
-        filled = self._sizes.get(place, 0)
-        if filled and filled + size > SIZE:
-            self._let_go(place)
-            filled = 0
-        gathered = self._pending.setdefault(place, [])
-        gathered.append(_EVERYBODY if destination is None else info_dst(destination))
-        gathered += submessages
-        self._sizes[place] = filled + size
+    def add(
+        self,
+        prefix: GuidPrefix,
+        submessages: list[bytes],
+        destination: GuidPrefix | None,
+        place: Locator,
+        joint: bool,
+    ) -> None:
+        """Send these of the participant `prefix`; joint: together with those of others."""
+        key = (EVERYBODY if joint else prefix), place
+        bundle = self.pending.get(key)
+        size = sum(map(len, submessages)) + INFO_SIZE
+        if bundle is not None and bundle.size + size > SIZE:
+            self._let_go(key)
+            bundle = None
+        if bundle is None:
+            bundle = self.pending[key] = _Bundle(prefix)
+        bundle.add(prefix, destination or EVERYBODY, submessages)
 
     def flush(self) -> None:
         """Send what has been gathered."""
-        for place in tuple(self._pending):
-            self._let_go(place)
+        for key in tuple(self.pending):
+            self._let_go(key)
 
-    def _let_go(self, place: Place) -> None:
-        del self._sizes[place]
-        self._send(self._pending.pop(place), None, place)
+    def _let_go(self, key: tuple[GuidPrefix, Locator]) -> None:
+        self._transmit(b"".join(self.pending.pop(key).parts), key[1])
+
+
+class _Bundle:
+    """A message that grows."""
+
+    __slots__ = ("_destination", "_prefix", "parts", "size")
+
+    def __init__(self, prefix: GuidPrefix) -> None:
+        self._prefix = prefix
+        self._destination = EVERYBODY
+        self.parts = [message(prefix)]
+        self.size = len(self.parts[0])
+
+    def add(self, prefix: GuidPrefix, destination: GuidPrefix, submessages: list[bytes]) -> None:
+        parts = list(submessages)
+        if destination != self._destination:
+            self._destination = destination
+            parts.insert(0, info_dst(destination))
+        if prefix != self._prefix:
+            self._prefix = prefix
+            parts.insert(0, info_src(prefix))
+        self.parts += parts
+        self.size += sum(map(len, parts))

@@ -7,7 +7,7 @@ known, and how often one may say something else, is limited.
 
 from typing import TYPE_CHECKING, Final
 
-from muros.rtps._constants import PROTOCOL_VERSION, StatusInfo
+from muros.rtps._constants import PROTOCOL_VERSION, VENDOR_OURS, StatusInfo
 from muros.rtps._discovery_data import InvalidDiscoveryData, ParticipantData, key_untrusted
 from muros.rtps._endpoint import SECOND
 from muros.rtps._events import Data
@@ -39,11 +39,13 @@ PREFIX_SIZE: Final = 12
 class Others:
     """`peers`: those that are there."""
 
-    __slots__ = ("_gone", "_home", "peers")
+    __slots__ = ("_gone", "_home", "kin", "peers")
 
     def __init__(self, home: "DomainCore") -> None:
         self._home = home
         self.peers: Final[dict[GuidPrefix, Peer]] = {}
+        self.kin: frozenset[Locator] = frozenset()
+        """Where those of them listen that are of this kind."""
         self._gone: dict[GuidPrefix, tuple[int, int]] = {}
 
     def announced(self, event: Data, source: Locator | None, now: int) -> None:
@@ -88,6 +90,7 @@ class Others:
     def lose(self, peer: Peer, why: Why, now: int) -> None:
         """One is there no more."""
         del self.peers[peer.prefix]
+        self._find_kin()
         self._home.agenda.forget(peer)
         for participant in self._home.participants:
             participant.part(peer, why, now)
@@ -108,8 +111,8 @@ class Others:
         peer = Peer(data, event.payload, source, now, budget, self._silent)
         peer.sequence = event.sequence
         peer.lease = max(peer.lease, settings.lease_least)
-        self._locate(peer)
         self.peers[peer.prefix] = peer
+        self._locate(peer)
         self._home.agenda.at(peer, now + peer.lease)
         for participant in self._home.participants:
             participant.meet(peer, now)
@@ -131,11 +134,20 @@ class Others:
 
     def _locate(self, peer: Peer) -> None:
         peer.locate(self._home.hosts)
+        self._find_kin()
         if not peer.discovery or not peer.user:
             data = peer.data
             offered = data.metatraffic_unicast + data.default_unicast
             addresses = ", ".join(map(str, offered))
             self._home.report(DomainProblem.UNREACHABLE, peer.prefix, len(offered), addresses, peer.source)
+
+    def _find_kin(self) -> None:
+        self.kin = frozenset(
+            place
+            for peer in self.peers.values()
+            if peer.data.vendor == VENDOR_OURS
+            for place in peer.discovery
+        )
 
     def _departed(self, guid: Guid, event: Data, now: int) -> None:
         prefix = event.source

@@ -68,6 +68,8 @@ class ParticipantCore:
         """What others are told of it."""
         self.on_event = on_event
         self.closed = False
+        self.held = False
+        """Not yet there for others, since they are still told that an earlier life has gone."""
         self.send = home.sender(self.prefix)
         """For its cores."""
         self._writers: dict[EntityId, LocalWriter] = {}
@@ -78,7 +80,13 @@ class ParticipantCore:
         self._next_key = FIRST_KEY
         self._discovery = Discovery(self)
         self._announcer = Announcer(
-            data, self.send, home.settings, home.addresses.announce_to, home.peers, home.number, now
+            data,
+            home.gatherer(self.prefix, self.send),
+            home.settings,
+            home.addresses.announce_to,
+            home.peers,
+            home.number,
+            now,
         )
         self._welcome = Welcome(self._announcer, home.agenda, self._discovery.is_heard_by)
         self._automatic = Assertions(False, home.agenda, self._discovery.say_alive)
@@ -211,7 +219,8 @@ class ParticipantCore:
         self.home.now = now
         self.data = replace(self.data, user_data=user_data)
         self._announcer.change(self.data, now)
-        self.home.agenda.at(self._announcer, now)
+        if not self.held:
+            self.home.agenda.at(self._announcer, now)
         self.home.finish()
 
     def assert_liveliness(self, now: int) -> None:
@@ -230,7 +239,10 @@ class ParticipantCore:
     # --- What its domain, discovery and endpoints do -----------------------------------------------------
 
     def start(self, now: int) -> None:
-        """It has been added to the domain."""
+        """It is there from now on."""
+        if self.held:
+            self.held = False
+            self._announcer.change(self.data, now)  # with a number above that of the last farewell
         for peer in self.home.peers.values():
             self.meet(peer, now)
         self.home.agenda.at(self._announcer, now)
@@ -239,7 +251,8 @@ class ParticipantCore:
         """It is taken from the domain."""
         for local in self.locals():
             self.close_endpoint(local, now)
-        self._announcer.leave()
+        if not self.held:
+            self._announcer.leave()
         self.closed = True
         for prefix in tuple(self._discovery.known):
             self._discovery.part(prefix, Why.CLOSED, now)
@@ -261,20 +274,30 @@ class ParticipantCore:
         self._announcer.announce_to = self.home.addresses.announce_to
         self.data = data
         self._announcer.change(data, now)
-        self.home.agenda.at(self._announcer, now)
+        if not self.held:
+            self.home.agenda.at(self._announcer, now)
 
     def is_own_announcement(self, payload: bytes) -> bool:
         """Whether it has said this itself."""
         return payload == self._announcer.content
 
+    def say_farewell(self) -> None:
+        """It has gone; tell those known again."""
+        self._announcer.leave(again=True)
+        self.home.finish()
+
     def meet(self, peer: Peer, now: int) -> None:
         """Somebody is there."""
+        if self.held:
+            return
         self.tell(ParticipantFound(peer.data))
         self._welcome.add(peer, now)
         self._discovery.meet(peer, now)
 
     def update(self, peer: Peer, before: ParticipantData | None, now: int) -> None:
         """Somebody says something else of itself (`before` is what it said), or is to be reached elsewhere."""
+        if self.held:
+            return
         if before is not None:
             self.tell(ParticipantChanged(peer.data, before))
         self._discovery.meet(peer, now)
@@ -284,6 +307,8 @@ class ParticipantCore:
 
     def part(self, peer: Peer, why: Why, now: int) -> None:
         """Somebody is there no more."""
+        if self.held:
+            return
         self._discovery.part(peer.prefix, why, now)
         self.tell(ParticipantLost(peer.data, why))
 

@@ -21,7 +21,7 @@ so that a writer that keeps all stops, until `resume`.
 from collections.abc import Iterable
 from typing import Final, Protocol
 
-from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, newer
+from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, first_count, newer
 from muros.rtps._fragments import FRAGMENT_COST, Assembly, fragments_of
 from muros.rtps._settings import READER_DEFAULTS, ReaderSettings
 from muros.rtps._values import EntityId, Guid, GuidPrefix, split_guid
@@ -121,6 +121,7 @@ class ReaderCore:
             return
         proxy = self._proxies[key] = WriterProxy(*key, tuple(places), self.reliable and reliable)
         proxy.hello_base = hello_base
+        proxy.sent_count = proxy.sent_fragment_count = first_count(now)
         if proxy.reliable:
             self._hello(proxy, now)
 

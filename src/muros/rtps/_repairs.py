@@ -4,10 +4,12 @@ Each reader gets what it asked for, and it alone; a GAP for what is gone or was 
 behind, so that it asks for more at once. All this leaves within an allowance.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Final
 
-from muros.rtps._endpoint import Send
+from muros.rtps._constants import ENTITYID_UNKNOWN
+from muros.rtps._endpoint import Place, Send
 from muros.rtps._fragments import fragments_of
 from muros.rtps._history import History, Sample
 from muros.rtps._reader_proxy import ReaderProxy
@@ -28,12 +30,21 @@ class Repairs:
     """The repairs of one writer; `waiting` are the readers that want something again.
 
     size: bytes of a fragment and of a datagram. hold_off: what was sent again is not sent once more within it (ns).
+    together: what several readers at one place miss is sent to all there at once, whether they miss it or not.
     """
 
-    __slots__ = ("_allowance", "_entity", "_history", "_hold_off", "_send", "_size", "waiting")
+    __slots__ = ("_allowance", "_entity", "_history", "_hold_off", "_send", "_size", "_together", "waiting")
 
     def __init__(
-        self, entity: EntityId, send: Send, history: History, allowance: Allowance, size: int, hold_off: int
+        self,
+        entity: EntityId,
+        send: Send,
+        history: History,
+        allowance: Allowance,
+        size: int,
+        hold_off: int,
+        *,
+        together: bool = False,
     ) -> None:
         self._entity = entity
         self._send = send
@@ -41,6 +52,7 @@ class Repairs:
         self._allowance = allowance
         self._size = size
         self._hold_off = hold_off
+        self._together = together
         self.waiting: dict[ReaderProxy, None] = {}
 
     def want(self, proxy: ReaderProxy, event: AckNack, lowest: int, sent: int, now: int) -> tuple[bool, bool]:
@@ -96,8 +108,10 @@ class Repairs:
 
     def run(self, now: int, heartbeat: Callable[[ReaderProxy], bytes]) -> None:
         """Send again what the allowance has room for."""
+        if self._together and len(self.waiting) > 1:
+            self._send_to_all(now)
         for proxy in tuple(self.waiting):
-            packet = Packet(self._send, proxy, self._size)
+            packet = Packet(self._send, proxy.prefix, proxy.places, self._size)
             gone: list[int] = []
             while proxy.wanted and self._allowance.allows(now):
                 number = next(iter(proxy.wanted))
@@ -116,6 +130,29 @@ class Repairs:
             if not proxy.wanted:
                 del self.waiting[proxy]
                 packet.add(heartbeat(proxy))
+            packet.flush()
+
+    def _send_to_all(self, now: int) -> None:
+        """Send what several readers at one place miss to everybody there."""
+        by_place: dict[tuple[Place, ...], list[ReaderProxy]] = {}
+        for proxy in self.waiting:
+            by_place.setdefault(proxy.places, []).append(proxy)
+        for places, proxies in by_place.items():
+            missed = Counter(number for proxy in proxies for number in proxy.wanted)
+            packet = Packet(self._send, None, places, self._size)
+            for number in sorted(number for number, times in missed.items() if times > 1):
+                sample = self._history.get(number)
+                if sample is None or sample.to is not None:
+                    continue
+                content = data_of(sample, ENTITYID_UNKNOWN, self._entity)
+                if len(content) > self._size:
+                    continue
+                if not self._allowance.allows(now):
+                    break
+                packet.add(sample.stamp, content)
+                self._allowance.spend(len(content) * len(places))
+                for proxy in proxies:
+                    proxy.wanted.pop(number, None)
             packet.flush()
 
     def _send_fragments(

@@ -7,7 +7,7 @@ from typing import Final
 from muros.rtps._endpoint import Place, Send
 from muros.rtps._history import Sample
 from muros.rtps._reader_proxy import ReaderProxy
-from muros.rtps._values import EntityId
+from muros.rtps._values import EntityId, GuidPrefix
 from muros.rtps._wire import data, data_frag, gap, info_dst, split_numbers
 
 __all__ = ["Allowance", "Packet", "Window", "data_of", "fragment_of", "gaps", "skips_of"]
@@ -138,14 +138,17 @@ class Window:
 
 
 class Packet:
-    """Submessages for one reader, sent together as long as they fit a datagram."""
+    """Submessages for one participant, or for everybody, sent together as long as they fit a datagram."""
 
-    __slots__ = ("_filled", "_proxy", "_send", "_submessages", "size")
+    __slots__ = ("_destination", "_filled", "_places", "_send", "_submessages", "size")
 
-    def __init__(self, send: Send, proxy: ReaderProxy, size: int) -> None:
+    def __init__(
+        self, send: Send, destination: GuidPrefix | None, places: tuple[Place, ...], size: int
+    ) -> None:
         self.size = size
         self._send = send
-        self._proxy = proxy
+        self._destination = destination
+        self._places = places
         self._submessages: list[bytes] = []
         self._filled = 0
 
@@ -160,8 +163,8 @@ class Packet:
     def flush(self) -> None:
         """Send what was begun."""
         if self._submessages:
-            for place in self._proxy.places:
-                self._send(self._submessages, self._proxy.prefix, place)
+            for place in self._places:
+                self._send(self._submessages, self._destination, place)
             self._submessages = []
             self._filled = 0
 

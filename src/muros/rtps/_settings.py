@@ -28,6 +28,9 @@ class WriterSettings:
     """What was sent again to a reader is not sent once more to it within this time."""
     window: int = 1 << 20
     """Bytes that may be on their way to reliable readers, at most; fewer while any of them get lost."""
+    together: bool = False
+    """What readers have missed is sent by the next `tick`, due at once, what several at one place have missed to all of
+    them at once. Only for writers whose readers all want what is kept, such as those of discovery."""
     burst: int = 256 * 1024
     """Bytes of repairs and of fragments that are not within the window, sent in one go."""
     pace: int = MILLISECOND

@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable
 from typing import Final
 
 from muros.rtps._constants import ENTITYID_UNKNOWN
-from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, newer
+from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, first_count, newer
 from muros.rtps._fragments import fragments_of
 from muros.rtps._history import History, Sample
 from muros.rtps._reader_proxy import ReaderProxy
@@ -72,7 +72,7 @@ class WriterCore:
     __slots__ = (
         "_allowance", "_ask_at", "_ask_every", "_count", "_cursor", "_endpoint_qos", "_entity",
         "_history", "_idle", "_lagging", "_leaving", "_lifespan", "_on_room", "_proxies", "_refused", "_refused_at",
-        "_reliable", "_repairs", "_report", "_retains", "_routes", "_send", "_unasked", "_unsent",
+        "_reliable", "_repair_at", "_repairs", "_report", "_retains", "_routes", "_send", "_unasked", "_unsent",
         "_window", "_with_qos", "due", "guid", "last", "reliable", "sent", "settings",
     )  # fmt: skip
 
@@ -118,7 +118,13 @@ class WriterCore:
         self._allowance = Allowance(settings.burst, settings.pace)
         self._window = Window(settings.window)
         self._repairs = Repairs(
-            self._entity, send, self._history, self._allowance, settings.fragment_size, settings.hold_off
+            self._entity,
+            send,
+            self._history,
+            self._allowance,
+            settings.fragment_size,
+            settings.hold_off,
+            together=settings.together,
         )
         self._count = 0
         self._ask_at = 0
@@ -127,6 +133,7 @@ class WriterCore:
         self._unasked = 0
         self._refused = False
         self._refused_at = 0
+        self._repair_at = NEVER
         self.due = NEVER
         """When `tick` is needed next, `NEVER` = not before something else happens."""
 
@@ -165,6 +172,8 @@ class WriterCore:
         Everything for it goes to each of `places`. For a reader that is matched already only they are changed; it is
         then told anew what there is.
         """
+        if not self._count:
+            self._count = first_count(now)
         key = split_guid(reader)
         proxy = self._proxies.get(key)
         if proxy is not None:
@@ -268,7 +277,10 @@ class WriterCore:
     def on_acknack(self, event: AckNack, now: int) -> None:
         """A reader says what it has and what it misses (8.4.7.5). Others' and old ones are ignored."""
         proxy = self._proxies.get((event.source, event.reader))
-        if proxy is None or not proxy.reliable or not newer(event.count, proxy.count):
+        if proxy is None or not proxy.reliable:
+            return
+        if not newer(event.count, proxy.count):
+            self._begin_anew(proxy, event)
             return
         is_first, proxy.count = proxy.count is None, event.count
         acked = min(event.base - 1, self.sent)
@@ -281,7 +293,7 @@ class WriterCore:
         if missed:
             self._lost(now)
         if answered:
-            self._repair(now)
+            self._repair_soon(now)
         elif not event.final:
             # One that is not final asks for an answer. The answer must not ask back when nothing has changed:
             # two such sides would not come to rest.
@@ -296,6 +308,12 @@ class WriterCore:
                 self._pump(now)
             self._release(now)
 
+    def _begin_anew(self, proxy: ReaderProxy, event: AckNack) -> None:
+        """An old count counts where a reader has forgotten us, has met us again, and asks what there is."""
+        if event.base <= 1 and not event.missing and not event.final and event.count != proxy.count:
+            proxy.count, proxy.fragment_count = event.count, None
+            self._send_heartbeat(proxy, final=proxy in self._idle)
+
     def on_nack_frag(self, event: NackFrag, now: int) -> None:
         """A reader misses fragments of a sample (8.3.7.10)."""
         proxy = self._proxies.get((event.source, event.reader))
@@ -305,7 +323,7 @@ class WriterCore:
         if proxy.acked < event.sequence <= self.sent:
             if self._repairs.want_fragments(proxy, event):
                 self._lost(now)
-            self._repair(now)
+            self._repair_soon(now)
 
     def assert_liveliness(self, now: int) -> None:
         """Say that a writer with manual liveliness is alive (8.3.7.5: HEARTBEAT with the liveliness flag)."""
@@ -329,8 +347,9 @@ class WriterCore:
             self._tell_room()
         self.due = min((proxy.due for proxy in self._lagging), default=NEVER)
         self.due = min(self.due, expires)
-        if self._unsent or self._repairs.waiting:
+        if self._unsent:
             self.due = min(self.due, now + self.settings.pace)
+        self.due = min(self.due, self._repair_at)
         if self._refused:
             self.due = min(self.due, self._patience_ends())
         return self.deadline
@@ -425,10 +444,19 @@ class WriterCore:
     def _repair(self, now: int) -> None:
         """Send again what readers want, to them alone, as far as the allowance goes."""
         repairs = self._repairs
-        if repairs.waiting:
-            repairs.run(now, self._asking_heartbeat)
-            if repairs.waiting:
-                self.due = min(self.due, now + self.settings.pace)
+        if not repairs.waiting:
+            self._repair_at = NEVER
+            return
+        repairs.run(now, self._asking_heartbeat)
+        self._repair_at = now + self.settings.pace if repairs.waiting else NEVER
+        self.due = min(self.due, self._repair_at)
+
+    def _repair_soon(self, now: int) -> None:
+        """Send what a reader wants; with what others are about to want, if they are served together."""
+        if self.settings.together:
+            self._repair_at = self.due = now
+        else:
+            self._repair(now)
 
     def _paces(self, sample: Sample) -> bool:
         """Whether the window counts for a sample.
