@@ -227,7 +227,7 @@ class TestGids:
             net.until(lambda life=life: (two.graph.topic("rt/odd") is not None) == bool(life % 2))  # type: ignore[misc]
             board.close()
             net.until(lambda: {node.name for node in two.graph.nodes} == {"watcher"})
-            assert two.graph.endpoint(writer.gid) is None
+            net.until(lambda writer=writer: two.graph.endpoint(writer.gid) is None)  # type: ignore[misc]
         assert not [event for event in events if isinstance(event, ParticipantLost)]
         assert other.process.core.participants
         data = {each.prefix: each for each in other.participant.participants}[board.gid[:12]]
