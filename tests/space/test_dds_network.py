@@ -229,9 +229,14 @@ class TestGids:
             net.until(lambda: {node.name for node in two.graph.nodes} == {"watcher"})
             net.until(lambda writer=writer: two.graph.endpoint(writer.gid) is None)  # type: ignore[misc]
         assert not [event for event in events if isinstance(event, ParticipantLost)]
-        assert other.process.core.participants
-        data = {each.prefix: each for each in other.participant.participants}[board.gid[:12]]
-        assert data.user_data == b"enclave=/4;"
+        net.until(
+            lambda: (
+                b"enclave=/4;"
+                in {
+                    each.user_data for each in other.participant.participants if each.prefix == board.gid[:12]
+                }
+            )
+        )
         net.run(5 * SECOND)
         (lost,) = (event for event in events if isinstance(event, ParticipantLost))
         assert lost.participant.prefix == board.gid[:12]
