@@ -19,7 +19,7 @@ client.uart Uart
 client.udp Udp
 rclc.action_client ActionClient
 rclc.action_server ActionServer
-*rclc.actions GoalError
+rclc.goal_error GoalError
 rclc.client Client
 rclc.context Context Node
 rclc.errors CapacityError InvalidNameError RclError
@@ -28,6 +28,7 @@ rclc.guard GuardCondition
 rclc.illegal TransitionError
 rclc.lifecycle Lifecycle
 rclc.lifecycle_client LifecycleClient
+rclc.logger Logger
 rclc.middleware register
 rclc.parameter_client ParameterClient
 rclc.parameter_errors ParameterError ParameterNotDeclaredError ParameterTypeError ParameterRejectedError

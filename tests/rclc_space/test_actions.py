@@ -5,13 +5,13 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from action_msgs.msg import GoalStatusArray
 
 from muros.rclc import ActionClient, ActionServer, CapacityError, Context, RclError
 from muros.rclc.action_client import SentGoal
 from muros.rclc.goals import Goal
 from tests.rclc_space.ways import Stage
 
+from action_msgs.msg import GoalStatusArray
 from example_interfaces.action import Fibonacci
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import String

@@ -119,7 +119,7 @@ def report_constants(types: list[str], file: TextIO) -> None:
 def _types(names: list[str], constants: frozenset[str] | None) -> dict[str, bytes]:
     from muros.interfaces import board
 
-    return {path: text.encode() for path, text in board.sources(names, constants=constants).items()}
+    return {path: text.encode() for path, text in board.sources(names, True, constants=constants).items()}
 
 
 def _replace(tree: dict[str, bytes], folder: Path) -> None:

@@ -34,6 +34,9 @@ from muros.interfaces._model import (
 from muros.interfaces._names import split_type
 from muros.interfaces._registry import Registry
 
+ACTION_TYPES = ("action_msgs/srv/CancelGoal", "action_msgs/msg/GoalStatusArray")
+"""What all actions have in common."""
+
 _HELPERS = {
     "muros.cdr": ("Fields", "block", "ended", "integer", "need", "numbers"),
     "muros.cdr_texts": ("count", "finish", "pad", "part", "put_text", "text", "text_size", "unpack"),
@@ -63,9 +66,9 @@ def generate(
 ) -> list[Path]:
     """Writes the modules of the named types and of all they need below a folder; returns the files, sorted.
 
-    Types that the folder already has in full stay full. ``action_services`` adds the services and the message that
-    carry an action. ``constants`` names those to keep; None keeps all but long lists. Raises :class:`InterfaceError`
-    for unknown types and for ``wstring``, which boards do not do.
+    Types that the folder already has in full stay full. ``action_services`` adds the services and the messages
+    that carry an action. ``constants`` names those to keep; None keeps all but long lists. Raises
+    :class:`InterfaceError` for unknown types and for ``wstring``, which boards do not do.
     """
     root = Path(folder)
     written: set[Path] = set()
@@ -126,6 +129,8 @@ class _Work:
                 self._message(message, name)
             parts = {"Goal": found.goal, "Result": found.result, "Feedback": found.feedback}
             if action_services:
+                for common in ACTION_TYPES:
+                    self.add(common, action_services)
                 self._message(found.feedback_message, name)
                 self._service(found.send_goal, name)
                 self._service(found.get_result, name)

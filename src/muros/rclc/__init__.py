@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from muros.client.qos import Qos as Qos
     from muros.rclc.action_client import ActionClient as ActionClient
     from muros.rclc.action_server import ActionServer as ActionServer
-    from muros.rclc.actions import GoalError as GoalError
     from muros.rclc.errors import CapacityError as CapacityError
     from muros.rclc.errors import InvalidNameError as InvalidNameError
     from muros.rclc.errors import RclError as RclError
+    from muros.rclc.goal_error import GoalError as GoalError
     from muros.rclc.hosts import Client as Client
     from muros.rclc.hosts import Context as Context
     from muros.rclc.hosts import Executor as Executor
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from muros.rclc.illegal import TransitionError as TransitionError
     from muros.rclc.lifecycle import Lifecycle as Lifecycle
     from muros.rclc.lifecycle_client import LifecycleClient as LifecycleClient
+    from muros.rclc.logger import Logger as Logger
     from muros.rclc.middleware import register as register
     from muros.rclc.parameter_client import ParameterClient as ParameterClient
     from muros.rclc.parameter_errors import ParameterError as ParameterError

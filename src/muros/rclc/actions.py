@@ -3,7 +3,6 @@
 from muros.client.chance import draw
 from muros.client.qos import Qos
 from muros.compat import const, ticks_add, ticks_diff
-from muros.rclc.errors import CapacityError, RclError
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -19,7 +18,6 @@ FULL = const(16)
 """The code with which a server tells ``on_problem`` that it has refused a goal, having as many as may be."""
 
 _HANDLE_INVALID = const(2300)
-_EVENT_INVALID = const(2301)
 _CANCEL = const(1)
 _REJECTED = const(1)
 _UNKNOWN = const(2)
@@ -27,12 +25,6 @@ _TERMINATED = const(3)
 
 _STATES = ("unknown", "accepted", "executing", "canceling", "succeeded", "canceled", "aborted")
 _EVENTS = ("execute", "be canceling", "succeed", "abort", "be canceled")
-
-
-class GoalError(RclError):
-    """A goal cannot do that in its state, or has ended."""
-
-    code = _EVENT_INVALID
 
 
 def make_server(
@@ -175,6 +167,8 @@ def _may_cancel(goal: "Goal") -> bool:
 
 def refuse(goal: "Goal", event: int) -> None:
     """Raises GoalError for an event that does not fit."""
+    from muros.rclc.goal_error import GoalError
+
     raise GoalError(
         "goal %s of action %r is %s: it cannot %s"
         % (short(goal.id), goal.server.name, _STATES[goal.status], _EVENTS[event])
@@ -183,6 +177,8 @@ def refuse(goal: "Goal", event: int) -> None:
 
 def ended(goal: "Goal") -> None:
     """Raises GoalError for feedback that comes too late."""
+    from muros.rclc.goal_error import GoalError
+
     error = GoalError(
         "goal %s of action %r has ended (%s): it gives no feedback any more"
         % (short(goal.id), goal.server.name, _STATES[goal.status])
@@ -193,6 +189,8 @@ def ended(goal: "Goal") -> None:
 
 def full(client: "ActionClient") -> None:
     """Raises CapacityError."""
+    from muros.rclc.errors import CapacityError
+
     raise CapacityError(
         "action client %r is full: %d goals of %d are on their way. Make it with goals=%d."
         % (client.name, client.capacity, client.capacity, client.capacity + 1)
