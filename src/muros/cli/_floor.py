@@ -29,6 +29,7 @@ HOST_ONLY = frozenset(
         "muros/client/reasons.py",
         "muros/rclc/_types.py",
         "muros/rclc/action_hosts.py",
+        "muros/rclc/host_logger.py",
         "muros/rclc/hosts.py",
         "muros/rclc/middleware.py",
         "muros/rclc/parameter_files.py",

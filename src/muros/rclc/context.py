@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from muros.rclc import contexts, node
     from muros.rclc._types import Entity, Middleware
     from muros.rclc.executor import Handle
+    from muros.rclc.logger import Logger
 
 
 class Context:
@@ -72,6 +73,12 @@ class Node:
         action_client = node.action_client
         parameters = node.parameters
         lifecycle = node.lifecycle
+        logger = node.logger
+
+        @property
+        def log(self) -> "Logger":
+            """The node's logger, on hosts; boards have ``log = node.logger()``."""
+
         destroy = node.destroy
         _topic = node._topic
         _resolve = node._resolve

@@ -17,7 +17,7 @@ from muros.client.names import topic_name
 from muros.client.qos import profile
 from muros.rclc import client as client_
 from muros.rclc import context as context_
-from muros.rclc import contexts, handles
+from muros.rclc import contexts, handles, host_logger
 from muros.rclc import executor as executor_
 from muros.rclc import guard as guard_
 from muros.rclc import node as node_
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from muros.rclc.action_hosts import ActionClient, ActionServer
     from muros.rclc.goals import Goal
     from muros.rclc.lifecycle import Lifecycle
+    from muros.rclc.logger import Logger
     from muros.rclc.parameters import Parameters
     from muros.rclc.timer import Timer
     from muros.xrce._types import Buffer
@@ -195,7 +196,7 @@ class Node(context_.Node):
         for callback in given:
             if callback is not None:
                 _be_callable(callback, "a callback of a lifecycle")
-        return node_.lifecycle(self, *given[:-1], services, time or _now)
+        return node_.lifecycle(self, *given[:-1], services, time or host_logger.system_time)
 
     def parameters(
         self,
@@ -240,6 +241,29 @@ class Node(context_.Node):
         from muros.rclc.action_hosts import make_client
 
         return make_client(self, kind, name, goals)
+
+    def logger(
+        self,
+        level: int | str = "info",
+        time: Callable[[], tuple[int, int]] | None = None,
+        show: Callable[[str], object] | None = host_logger.show_on_stderr,
+    ) -> Logger:
+        """A logger to /rosout, see ``muros.rclc.node.logger``: ``level`` by name, and shown on standard error.
+
+        Raises ValueError for a level that there is not.
+        """
+        for function in (time, show):
+            if function is not None:
+                _be_callable(function, "time or show of a logger")
+        return host_logger.make(self, level, time, show)
+
+    @property
+    def log(self) -> Logger:
+        """The logger of the node, made when it is first used: ``node.log.info(text)``."""
+        made = self.__dict__.get("_log")
+        if made is None:
+            made = self.__dict__["_log"] = self.logger()
+        return made
 
     def _join(self, handle: Made, make: Callable[[], Any]) -> Made:
         """Gives a handle its entity; one that cannot be made leaves nothing behind."""
@@ -459,11 +483,6 @@ class Executor(executor_.Executor):
             handles.spin_period(self, period)
         except KeyboardInterrupt:
             self.context.close()
-
-
-def _now() -> tuple[int, int]:
-    """The system's time in seconds and nanoseconds."""
-    return divmod(time.time_ns(), 1_000_000_000)
 
 
 def _be_text(name: Any, what: str) -> None:

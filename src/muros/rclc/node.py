@@ -3,6 +3,7 @@
 from muros.client.names import resolve, topic_name
 from muros.compat import borrow, const
 
+_INFO = const(20)
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from muros.rclc.context import Context, Node
     from muros.rclc.goals import Goal
     from muros.rclc.lifecycle import Callback, Lifecycle
+    from muros.rclc.logger import Logger
     from muros.rclc.parameters import Parameters
     from muros.rclc.service import Service
     from muros.rclc.subscription import Subscription
@@ -183,6 +185,22 @@ def action_client(self: "Node", kind: "Any", name: str, goals: int = 0) -> "Acti
     made = ActionClient(self.context, name)
     borrow("muros.rclc.actions").make_client(made, self, kind, goals)
     return made
+
+
+def logger(
+    self: "Node",
+    level: "Any" = _INFO,
+    time: "Callable[[], tuple[int, int]] | None" = None,
+    show: "Callable[[str], object] | None" = print,
+) -> "Logger":
+    """A logger to /rosout: ``info(text)`` and the like publish what is of ``level`` at least, and ``show`` it.
+
+    ``level`` is a number of ROS 2, 20 for info; hosts take names too. ``time()`` is what is told as the time,
+    (seconds, nanoseconds) such as ``TimeSync.time``: on hosts the system's, else 0. Needs rcl_interfaces/msg/Log.
+    """
+    from muros.rclc.logger import Logger, begin
+
+    return begin(Logger, self, None, level, time, show)
 
 
 def destroy(self: "Node") -> None:
