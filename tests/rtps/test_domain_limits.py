@@ -13,6 +13,8 @@ from muros.rtps import (
     EndpointQos,
     ParticipantChanged,
     ParticipantCore,
+    ParticipantLost,
+    Why,
 )
 from muros.rtps._constants import (
     ENTITYID_PARTICIPANT_MESSAGE_WRITER,
@@ -28,10 +30,11 @@ from tests.rtps.strangers import Stranger
 
 
 def met(**settings: Any) -> tuple[World, Process, ParticipantCore, Stranger]:
+    lease = settings.pop("lease", 100 * SECOND)
     world = World()
     process = world.process(settings=DomainSettings(**settings))
     participant = process.participant()
-    stranger = Stranger(process)
+    stranger = Stranger(process, lease=lease)
     stranger.announce()
     return world, process, participant, stranger
 
@@ -44,6 +47,27 @@ def test_peers_are_limited() -> None:
     assert process.core.counters["too-many-peers"] == 89
     assert [report.problem for report in process.reports] == [DomainProblem.TOO_MANY_PEERS]
     assert process.reports[0].number == 10
+
+
+def test_one_that_is_silent_and_has_nothing_makes_way_when_there_is_no_room() -> None:
+    world, _, participant, first = met(peers=3, lease=1000 * SECOND)
+    first.endpoint(0x103)
+    made_up = [Stranger(first.process, number, lease=10**18) for number in (2, 3)]
+    for stranger in made_up:
+        stranger.announce()
+    late, later = Stranger(first.process, 4), Stranger(first.process, 5)
+    late.announce()
+    assert late.prefix not in {found.prefix for found in participant.participants}
+    world.run(3 * SECOND)
+    made_up[0].announce()  # still speaks
+    first.announce()
+    world.run(3 * SECOND)
+    late.announce()
+    later.announce()
+    known = {found.prefix for found in participant.participants}
+    assert known == {first.prefix, made_up[0].prefix, late.prefix}
+    (lost,) = of(first.process.events[participant.prefix], ParticipantLost)
+    assert (lost.participant.prefix, lost.why) == (made_up[1].prefix, Why.LEASE)
 
 
 def test_participants_of_this_process_do_not_count_as_peers() -> None:

@@ -479,6 +479,60 @@ def test_each_instance_has_a_history_of_its_own() -> None:
     assert [sample.payload for sample in pair.right.got[late.guid]] == [payload(7), payload(8)]
 
 
+def test_a_writer_has_room_for_so_many_instances() -> None:
+    room = []
+    pair = Pair(keyed=True)
+    pair.writer.close(pair.now)
+    qos = replace(pair.writer_qos, limits=ResourceLimits(max_instances=2))
+    writer = pair.left.writer(pair.talker, qos=qos, keyed=True, on_room=lambda: room.append(pair.now))
+    keys = [bytes([number]) * 16 for number in range(3)]
+    assert [bool(writer.write(payload(1), pair.now, instance=key)) for key in (*keys, keys[0])] == [
+        1,
+        1,
+        0,
+        1,
+    ]
+    (told,) = pair.left_events(Trouble)
+    assert (told.local, told.problem, told.number) == (writer.guid, Problem.INSTANCES_FULL, 2)
+    writer.dispose(keys[0], pair.now)
+    assert not writer.write(payload(1), pair.now, instance=keys[2])
+    assert room == []
+    writer.unregister(keys[0], pair.now)
+    assert len(room) == 1
+    assert writer.write(payload(1), pair.now, instance=keys[2])
+
+
+def test_a_writer_that_keeps_all_has_room_for_so_many_samples_of_an_instance() -> None:
+    limits = ResourceLimits(max_samples=10, max_samples_per_instance=2)
+    pair = Pair(keyed=True, history=History.KEEP_ALL, limits=limits)
+    one, two = b"1" * 16, b"2" * 16
+    taken = [pair.write(number, instance=key) for number, key in enumerate((one, one, one, two, two, two))]
+    assert taken == [1, 2, 0, 3, 4, 0]
+    assert [told.number for told in pair.left_events(Trouble)] == [2, 2]
+    pair.run(SECOND)
+    assert pair.write(9, instance=one) == 5
+    assert [told.problem for told in pair.left_events(Trouble)] == [Problem.INSTANCES_FULL] * 2
+
+
+def test_a_reader_takes_so_many_instances() -> None:
+    pair = Pair(reader={"limits": ResourceLimits(max_instances=2)}, keyed=True, depth=10)
+    keys = [bytes([number]) * 16 for number in range(3)]
+    for number, key in enumerate((*keys, keys[0])):
+        pair.write(number, instance=key)
+    pair.run(SECOND)
+    assert [sample.payload for sample in pair.got] == [payload(0), payload(1), payload(3)]
+    (told,) = pair.right_events(Trouble)
+    assert (told.local, told.remote, told.problem) == (
+        pair.reader.guid,
+        pair.writer.guid,
+        Problem.INSTANCES_FULL,
+    )
+    pair.writer.dispose(keys[1], pair.now)
+    pair.write(7, instance=keys[2])
+    pair.run(SECOND)
+    assert [sample.payload for sample in pair.got][-1] == payload(7)
+
+
 def test_topics_without_a_key_have_no_instances() -> None:
     pair = Pair()
     with pytest.raises(ValueError, match="no key"):

@@ -54,6 +54,9 @@ class Problem(Enum):
     """Samples or fragments that came early were dropped, to be asked for again; the number: bytes."""
     INCOMPLETE = "samples-incomplete"
     """Fragments of best-effort samples whose rest never came were dropped; the number: samples."""
+    INSTANCES_FULL = "instances-full"
+    """A sample was refused or dropped, for its instance is one too many, or has too many samples already (resource
+    limits); the number: the limit. The peer is the writer of the sample."""
     INCONSISTENT = "fragments-inconsistent"
     """Fragments contradict each other or themselves; the number: submessages dropped."""
 

@@ -102,6 +102,13 @@ class History:
         if sample.last:
             self._ending.append(sample)
 
+    def count(self, instance: bytes) -> int:
+        """Samples held of an instance."""
+        numbers = self._instances.get(instance)
+        if numbers is not None:
+            return len(numbers)
+        return sum(sample.instance == instance for sample in self._samples.values())
+
     def drop_to(self, sequence: int) -> None:
         """Forget all samples up to and including `sequence`."""
         while (first := self.first()) is not None and first <= sequence:

@@ -9,17 +9,18 @@ from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 from muros.rtps._constants import StatusInfo, keyed
 from muros.rtps._discovery_data import EndpointData
+from muros.rtps._endpoint import Problem
 from muros.rtps._events import Data
 from muros.rtps._liveliness import OwnLease
-from muros.rtps._news import DeadlineMissed, LivelinessLost, Mismatch
+from muros.rtps._news import DeadlineMissed, LivelinessLost, Mismatch, Trouble
 from muros.rtps._parameters import InvalidParameters, Parameters, key_hash, status_info
 from muros.rtps._parameters import inline_qos as build_inline_qos
 from muros.rtps._ports import ReaderPort, WriterPort
-from muros.rtps._qos import EndpointQos, History, Liveliness, Ownership
+from muros.rtps._qos import EndpointQos, History, Liveliness, Ownership, ResourceLimits
 from muros.rtps._reader import ReaderCore
 from muros.rtps._settings import ReaderSettings, WriterSettings
 from muros.rtps._values import INFINITE, Guid
-from muros.rtps._watch import Deadlines, Owners
+from muros.rtps._watch import Deadlines, Instances, Owners
 from muros.rtps._writer import SENTINEL_SIZE, WriterCore
 
 if TYPE_CHECKING:
@@ -58,7 +59,8 @@ class LocalWriter(WriterPort):
     """A writer of ours. Made by `ParticipantCore.writer`."""
 
     __slots__ = (
-        "_deadlines", "_domain", "_lease", "_watched", "closed", "data", "guid", "owner", "refused", "remotes",
+        "_deadlines", "_domain", "_instances", "_lease", "_most_of_one", "_on_room", "_watched", "closed", "data",
+        "guid", "owner", "refused", "remotes",
     )  # fmt: skip
 
     def __init__(
@@ -115,6 +117,13 @@ class LocalWriter(WriterPort):
                 self._alive_or_not,
                 now,
             )
+        self._on_room = on_room
+        limits = qos.limits if keyed(self.entity) else None
+        self._instances = _instances(limits)
+        self._most_of_one = 0
+        """Samples that may be held of one instance; 0 = no limit."""
+        if limits is not None and qos.history == History.KEEP_ALL:
+            self._most_of_one = max(0, limits.max_samples_per_instance)
         self._watched = self._deadlines is not None or qos.liveliness != Liveliness.AUTOMATIC
 
     @property
@@ -148,7 +157,8 @@ class LocalWriter(WriterPort):
         instance: bytes = b"",
     ) -> int:
         """Write a sample (encapsulation included); its sequence number, or 0 when there is no room now (keep all):
-        `on_room` is called when writing is worth trying again.
+        `on_room` is called when writing is worth trying again. Also 0 when the resource limits have no room for one
+        more instance (until one is unregistered) or sample of it; `Trouble` tells.
 
         source_time: ns since 1970. inline_qos: a little-endian parameter list (`muros.rtps.inline_qos`).
         to: only this matched reader gets it (the others learn that it is not for them). instance: key hash of 16
@@ -159,6 +169,9 @@ class LocalWriter(WriterPort):
             raise ValueError("the writer is closed")
         domain = self._domain
         domain.now = now
+        if (self._instances is not None or self._most_of_one) and not self._has_room(instance):
+            domain.finish()
+            return 0
         if instance:
             inline_qos = inline_qos[:-SENTINEL_SIZE] + build_inline_qos(key_hash=instance)
         core = self.core
@@ -240,11 +253,26 @@ class LocalWriter(WriterPort):
             instance=instance,
             last=bool(status & StatusInfo.UNREGISTERED),
         )
-        if sequence is not None and self._deadlines is not None:
-            self._deadlines.end(instance)
+        if sequence is not None:
+            if self._deadlines is not None:
+                self._deadlines.end(instance)
+            if self._instances is not None and status & StatusInfo.UNREGISTERED:
+                self._instances.end(instance)
+                if self._on_room is not None:
+                    self._domain.later(self._on_room)
         self._domain.agenda.at(self, self.core.due)
         self._domain.finish()
         return sequence or 0
+
+    def _has_room(self, instance: bytes) -> bool:
+        """Whether the resource limits allow a sample of the instance now; tell if not."""
+        limit = self._most_of_one
+        if not limit or self.core.held_of(instance) < limit:
+            if self._instances is None or self._instances.admits(instance):
+                return True
+            limit = self._instances.most
+        self.owner.tell(Trouble(self.guid, self.guid, Problem.INSTANCES_FULL, limit))
+        return False
 
     def _written(self, instance: bytes, now: int) -> None:
         if self._deadlines is not None:
@@ -272,7 +300,7 @@ class LocalReader(ReaderPort):
     """A reader of ours. Made by `ParticipantCore.reader`."""
 
     __slots__ = (
-        "_deadlines", "_domain", "_keyed", "_lifespans", "_on_sample", "_plain", "closed", "data",
+        "_deadlines", "_domain", "_instances", "_keyed", "_lifespans", "_on_sample", "_plain", "closed", "data",
         "guid", "outranked", "owner", "owners", "refused", "remotes",
     )  # fmt: skip
 
@@ -315,6 +343,7 @@ class LocalReader(ReaderPort):
         self._deadlines: Deadlines | None = None
         if qos.deadline < INFINITE:
             self._deadlines = Deadlines(qos.deadline, domain.settings.instances, domain.agenda, self._missed)
+        self._instances = _instances(qos.limits if self._keyed else None)
         self._plain = not self._keyed and self.owners is None and self._deadlines is None
 
     @property
@@ -400,6 +429,12 @@ class LocalReader(ReaderPort):
         if self.owners is not None and not self.owners.admits(writer, instance):
             self.outranked += 1
             return False
+        if self._instances is not None:
+            if status:
+                self._instances.end(instance)
+            elif not self._instances.admits(instance):
+                self.owner.tell(Trouble(self.guid, writer, Problem.INSTANCES_FULL, self._instances.most))
+                return False
         if status & StatusInfo.UNREGISTERED and self.owners is not None:
             self.owners.free(instance)
         if self._deadlines is not None:
@@ -413,6 +448,10 @@ class LocalReader(ReaderPort):
         if self.owners is not None:
             self.owners.free(instance)
         self.owner.tell(DeadlineMissed(self.guid, total, instance))
+
+
+def _instances(limits: ResourceLimits | None) -> Instances | None:
+    return Instances(limits.max_instances) if limits is not None and limits.max_instances > 0 else None
 
 
 def status_info_of(inline_qos: Parameters | None) -> int:

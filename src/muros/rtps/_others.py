@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 
 from muros.rtps._constants import PROTOCOL_VERSION, VENDOR_OURS, StatusInfo
 from muros.rtps._discovery_data import InvalidDiscoveryData, ParticipantData, key_untrusted
-from muros.rtps._endpoint import SECOND
+from muros.rtps._endpoint import MILLISECOND, SECOND
 from muros.rtps._events import Data
 from muros.rtps._news import DomainProblem, Why
 from muros.rtps._parameters import InvalidParameters, status_info
@@ -33,13 +33,19 @@ UPDATES_BURST: Final = 20
 UPDATES_PER_SECOND: Final = 5
 """... and in a second thereafter. What it says beyond is heard when it is said again."""
 
+IDLE: Final = 5 * SECOND
+"""Where there is no room for more, one that has no endpoints makes way for a newcomer after this silence."""
+
+LOOK_AGAIN: Final = 100 * MILLISECOND
+"""When none such was found, it is looked for again after this time."""
+
 PREFIX_SIZE: Final = 12
 
 
 class Others:
     """`peers`: those that are there."""
 
-    __slots__ = ("_gone", "_home", "kin", "peers")
+    __slots__ = ("_gone", "_home", "_look_at", "kin", "peers")
 
     def __init__(self, home: "DomainCore") -> None:
         self._home = home
@@ -47,6 +53,7 @@ class Others:
         self.kin: frozenset[Locator] = frozenset()
         """Where those of them listen that are of this kind."""
         self._gone: dict[GuidPrefix, tuple[int, int]] = {}
+        self._look_at = 0
 
     def announced(self, event: Data, source: Locator | None, now: int) -> None:
         """A participant says something of itself."""
@@ -75,7 +82,7 @@ class Others:
             home.counters["foreign"] += 1
         elif peer is not None:
             self._update(peer, data, event, source, now)
-        elif len(self.peers) >= home.settings.peers:
+        elif len(self.peers) >= home.settings.peers and not self._make_place(now):
             home.refuse(DomainProblem.TOO_MANY_PEERS, b"", prefix.hex(), home.settings.peers)
         else:
             self._meet(data, event, source, now)
@@ -96,6 +103,28 @@ class Others:
             participant.part(peer, why, now)
 
     # --- Helpers -----------------------------------------------------------------------------------------
+
+    def _make_place(self, now: int) -> bool:
+        """Let go of the one that has been silent longest of those that have no endpoints, if it was silent for long.
+
+        So nobody keeps others out for long by making participants up.
+        """
+        if now < self._look_at:
+            return False
+        self._look_at = now + LOOK_AGAIN
+        participants = self._home.participants
+        idle = (
+            peer
+            for peer in self.peers.values()
+            if now - peer.seen >= IDLE
+            and not any(one.knows_endpoints_of(peer.prefix) for one in participants)
+        )
+        longest = min(idle, key=lambda peer: peer.seen, default=None)
+        if longest is None:
+            return False
+        self._look_at = now
+        self.lose(longest, Why.LEASE, now)
+        return True
 
     def _is_of_this_domain(self, data: ParticipantData, source: Locator | None) -> bool:
         home = self._home

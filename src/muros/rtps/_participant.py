@@ -260,6 +260,11 @@ class ParticipantCore:
         for timed in (self._announcer, self._welcome, self._automatic, self._manual):
             self.home.agenda.forget(timed)
 
+    def knows_endpoints_of(self, prefix: GuidPrefix) -> bool:
+        """Whether somebody has told of writers or readers."""
+        known = self._discovery.known.get(prefix)
+        return known is not None and bool(known.endpoints)
+
     def lead(self, now: int) -> None:
         """From now on it is the one that announces itself to those not known yet."""
         self._announcer.lead(now)

@@ -7,7 +7,7 @@ from muros.rtps._agenda import Agenda, Timed
 from muros.rtps._endpoint import NEVER
 from muros.rtps._values import Guid
 
-__all__ = ["Deadlines", "Owners"]
+__all__ = ["Deadlines", "Instances", "Owners"]
 
 
 class Deadlines(Timed):
@@ -64,6 +64,31 @@ class Deadlines(Timed):
             self.total += periods
             self._on_miss(self.total, instance)
         return next(iter(due.values()), NEVER)
+
+
+class Instances:
+    """The instances of a topic with a key that are alive, at most `most` (DDS 1.4, 2.2.3.19: RESOURCE_LIMITS)."""
+
+    __slots__ = ("_alive", "most")
+
+    def __init__(self, most: int) -> None:
+        self.most: Final = most
+        self._alive: dict[bytes, None] = {}
+
+    def __len__(self) -> int:
+        return len(self._alive)
+
+    def admits(self, instance: bytes) -> bool:
+        """Whether there is room for a sample of this one, which lives from now on."""
+        if instance not in self._alive:
+            if len(self._alive) >= self.most:
+                return False
+            self._alive[instance] = None
+        return True
+
+    def end(self, instance: bytes) -> None:
+        """It has ended."""
+        self._alive.pop(instance, None)
 
 
 class Owners:

@@ -152,6 +152,10 @@ class WriterCore:
         """Samples kept."""
         return len(self._history)
 
+    def held_of(self, instance: bytes) -> int:
+        """Samples kept of an instance."""
+        return self._history.count(instance)
+
     @property
     def acknowledged(self) -> int:
         """All reliable readers that are not set aside have everything up to this sequence number."""
