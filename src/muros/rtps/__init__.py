@@ -12,7 +12,9 @@ module                            holds
 ``_wire``                         building messages, and all that is needed to handle them
 ``_qos``, ``_discovery_data``     participants and endpoints as discovery carries them
 ``_writer``, ``_reader``          best-effort and reliable endpoints as state machines
-``_domain``, ``_participant``     those of this process that meet others, and what they stand on
+``_domain``, ``_participant``     those of this process, and what they stand on: ``_others`` and ``_discovery``
+                                  (who else is there), ``_registry`` and ``_matching`` (who meets whom)
+``_local``                        writers and readers in users' hands
 ``_news``                         what a participant tells its owner
 ================================  ============================================================================
 """
