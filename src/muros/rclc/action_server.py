@@ -186,7 +186,6 @@ class ActionServer(Handle):
             if self.on_accepted is not None:
                 self.on_accepted(goal)
             elif goal.status == _ACCEPTED:
-                self._publish(now)
                 goal.execute()
         for running in self._running[:]:
             if ticks_diff(running[2], now) <= 0:

@@ -19,6 +19,7 @@ FULL = const(16)
 
 _HANDLE_INVALID = const(2300)
 _CANCEL = const(1)
+_STATES_KEPT = const(10)  # upstream keeps 1; who comes while a goal changes its state would miss some
 _REJECTED = const(1)
 _UNKNOWN = const(2)
 _TERMINATED = const(3)
@@ -58,7 +59,7 @@ def make_server(
             node.service(kind.GetResult, base + "get_result", made.take_result),
         ]
         made.feedback = node.publisher(kind.FeedbackMessage, base + "feedback")
-        made.status = node.publisher(array_kind, base + "status", "status")
+        made.status = node.publisher(array_kind, base + "status", Qos(True, _STATES_KEPT, "transient_local"))
         for service in services:
             service.depth = max(service.depth, made.capacity)
         made.parts = services
@@ -79,7 +80,7 @@ def make_client(made: "ActionClient", node: "Node", kind: "Any", capacity: int, 
             node.client(kind.GetResult, base + "get_result"),
             node.subscription(kind.FeedbackMessage, base + "feedback", made.take_feedback),
             node.subscription(
-                array_kind, base + "status", made.take_states, Qos(True, 10, "transient_local")
+                array_kind, base + "status", made.take_states, Qos(True, _STATES_KEPT, "transient_local")
             ),
         ]
     finally:
