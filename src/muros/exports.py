@@ -33,6 +33,7 @@ rclc.middleware register
 rclc.parameter_client ParameterClient
 rclc.parameter_errors ParameterError ParameterNotDeclaredError ParameterTypeError ParameterRejectedError
 rclc.parameters Parameter Parameters
+rclc.ros_time RosTime
 rclc.service Service
 rclc.subscription Subscription
 rclc.timer Timer

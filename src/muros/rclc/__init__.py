@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from muros.rclc.parameter_errors import ParameterTypeError as ParameterTypeError
     from muros.rclc.parameters import Parameter as Parameter
     from muros.rclc.parameters import Parameters as Parameters
+    from muros.rclc.ros_time import RosTime as RosTime
     from muros.rclc.timer import Timer as Timer
     from muros.rclc.triggers import all_of as all_of
     from muros.rclc.triggers import any_of as any_of

@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from muros.rclc import contexts, node
     from muros.rclc._types import Entity, Middleware
     from muros.rclc.executor import Handle
-    from muros.rclc.logger import Logger
 
 
 class Context:
@@ -74,11 +73,6 @@ class Node:
         parameters = node.parameters
         lifecycle = node.lifecycle
         logger = node.logger
-
-        @property
-        def log(self) -> "Logger":
-            """The node's logger, on hosts; boards have ``log = node.logger()``."""
-
         destroy = node.destroy
         _topic = node._topic
         _resolve = node._resolve
