@@ -17,6 +17,7 @@ COMMANDS = {
     "board": ("muros.cli.board", "write the files that a MicroPython board needs"),
     "interface": ("muros.cli.interface", "show, list and generate message, service and action types"),
     "topic": ("muros.cli.topic", "list, show, publish and measure topics of the ROS 2 graph"),
+    "param": ("muros.cli.param", "list, show and set parameters of nodes"),
     "node": ("muros.cli.node", "list and show nodes of the ROS 2 graph"),
     "doctor": ("muros.cli.doctor", "say what is wrong with this host and with the graph"),
     "graph": ("muros.cli.graph", "show who talks to whom, as text or as a picture"),

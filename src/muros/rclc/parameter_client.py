@@ -143,17 +143,31 @@ class ParameterClient:
 
         If not ``atomically``, each is set that can be, and the error names the others.
         """
+        return self._update(values, {}, atomically, timeout, then)
+
+    def _update(
+        self,
+        values: "dict[str, Any]",
+        known: "dict[str, int]",
+        atomically: bool,
+        timeout: "float | None",
+        then: "Callable[[Any], object] | None",
+    ) -> "Any":
+        """``update``; ``known`` are the types of lists without an element."""
         lib = borrow("muros.rclc.parameter_values")
         service = "SetParametersAtomically" if atomically else "SetParameters"
         request = self._kind("srv/" + service).Request()
         wanted = []
         for name in values:
             value = values[name]
-            kind = lib.kind_of(value)
+            kind = lib.kind_of(value, known.get(name, 0))
             if value is not None and kind == 0:
                 from muros.rclc.parameter_errors import InvalidParameterError
 
-                raise InvalidParameterError("parameter %r cannot be %r" % (name, value))
+                raise InvalidParameterError(
+                    "parameter %r cannot be %r: a value is a bool, int, float, str, bytes, or a list of one of these"
+                    % (name, value)
+                )
             made = self._kind("msg/Parameter")()
             made.name = name
             made.value = lib.put(self._kind("msg/ParameterValue")(), kind, value)

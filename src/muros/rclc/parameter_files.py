@@ -50,7 +50,7 @@ class ParameterClient(parameter_client.ParameterClient):
         names = [name for name in self.list(timeout=timeout) if name in values]
         known = self.types(names, timeout) if names else {}
         values = {name: fitting(value, known.get(name, 0)) for name, value in values.items()}
-        self.update(values, False, timeout)
+        self._update(values, known, False, timeout, None)
         return values
 
     def dump(self, file: str | os.PathLike[str] | None = None, timeout: float | None = None) -> str:
