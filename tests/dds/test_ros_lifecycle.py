@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from muros.rclc import Context, LifecycleClient
+from muros.rclc import Context, Executor, LifecycleClient
 from muros.rclc.lifecycle_states import STATES, TRANSITIONS
 from tests.cli.shell import Shell
 from tests.dds.domains import Domain, free_domain
@@ -116,6 +116,8 @@ def test_we_move_a_node_of_ros(ros: Peer, domain: Domain) -> None:
     context = Context(f"dds:{int(domain)}")
     try:
         client = LifecycleClient(context.node("mover"), "/lab/lidar")
+        events: list[tuple[str, str]] = []
+        client.on_event(lambda start, goal: events.append((start, goal)))
         end = time.monotonic() + PATIENCE
         while (state := client.state(timeout=1.0)) is None:
             assert time.monotonic() < end
@@ -128,6 +130,18 @@ def test_we_move_a_node_of_ros(ros: Peer, domain: Domain) -> None:
         assert client.state() == "inactive"
         assert client.change("shutdown") is True
         assert client.state() == "finalized"
+        executor = Executor(context)
+        while len(events) < 6:
+            assert time.monotonic() < end + PATIENCE
+            executor.spin_some(0.1)
+        assert events == [
+            ("unconfigured", "configuring"),
+            ("configuring", "inactive"),
+            ("inactive", "activating"),
+            ("activating", "inactive"),
+            ("inactive", "shuttingdown"),
+            ("shuttingdown", "finalized"),
+        ]
     finally:
         context.close()
 
