@@ -6,9 +6,12 @@ from typing import Any
 
 import pytest
 
+from muros.client import Session, Udp
+from muros.links import UdpLink
 from muros.rclc import ActionClient, ActionServer, CapacityError, Context, RclError
 from muros.rclc.action_client import SentGoal
 from muros.rclc.goals import Goal
+from tests.client.agent_thread import RunningAgent
 from tests.rclc_space.ways import Stage
 
 from action_msgs.msg import GoalStatusArray
@@ -410,3 +413,77 @@ def test_a_result_of_another_type_is_refused(stage: Stage) -> None:
     with pytest.raises(TypeError, match="a goal takes example_interfaces/action/Fibonacci_Result here"):
         stage.until(lambda: pair.results)
     assert goal.result is None
+
+
+def test_a_goal_outlives_its_agent() -> None:
+    link = UdpLink(0, "127.0.0.1")
+    agent = RunningAgent(link)
+
+    class Way:
+        direct = False
+
+        def open(self) -> Context:
+            session = Session(Udp("127.0.0.1", link.port), keepalive=100, retry=100)
+            context = Context(session)
+            context.on_problem(lambda code, text: None)  # that the agent is gone
+            return context
+
+        def close(self) -> None:
+            agent.stop()
+
+    stage = Stage(Way())
+    try:
+        released: list[int] = []
+
+        def run(goal: Goal) -> Iterator[float]:
+            while not released:
+                yield 0.01
+            goal.succeed(Fibonacci.Result(sequence=[3]))
+
+        pair = Pair(stage, run)
+        goal = pair.send(1)
+        pair.until_executing(goal)
+        agent.stop()
+        stage.until(lambda: all(context.state != "CONNECTED" for context in stage.contexts))
+        agent = RunningAgent(UdpLink(link.port, "127.0.0.1"))
+        stage.until(lambda: all(context.state == "CONNECTED" for context in stage.contexts))
+        heard: list[list[int]] = []
+        stage.node("late").subscription(
+            GoalStatusArray,
+            "/count/_action/status",
+            lambda array: heard.append([entry.status for entry in array.status_list]),
+            "status",
+        )
+        stage.until(lambda: heard)
+        assert heard[0] == [EXECUTING], "the new agent knows the states"
+        released.append(1)
+        assert pair.result(goal) == [3]
+        assert goal.status == SUCCEEDED
+    finally:
+        stage.close()
+
+
+class Robber:
+    """A requester whose first request for a result goes nowhere."""
+
+    def __init__(self, requester: Any) -> None:
+        self.requester = requester
+        self.asked = 0
+
+    def room(self) -> bool:
+        return bool(self.requester.room())
+
+    def send(self, request: Any) -> int:
+        self.asked += 1
+        return 10**6 if self.asked == 1 else int(self.requester.send(request))
+
+    def destroy(self) -> None:
+        self.requester.destroy()
+
+
+def test_a_result_that_was_lost_is_asked_for_again(stage: Stage) -> None:
+    pair = Pair(stage)
+    robber = pair.client.parts[2].entity = Robber(pair.client.parts[2].entity)
+    goal = pair.send(1)
+    assert pair.result(goal) == [0, 1, 1]
+    assert robber.asked == 2
