@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from muros.rclc.lifecycle_client import LifecycleClient as LifecycleClient
     from muros.rclc.logger import Logger as Logger
     from muros.rclc.middleware import register as register
-    from muros.rclc.parameter_client import ParameterClient as ParameterClient
+    from muros.rclc.parameter_files import ParameterClient as ParameterClient
     from muros.rclc.parameter_errors import ParameterError as ParameterError
     from muros.rclc.parameter_errors import ParameterNotDeclaredError as ParameterNotDeclaredError
     from muros.rclc.parameter_errors import ParameterRejectedError as ParameterRejectedError

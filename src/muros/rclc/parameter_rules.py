@@ -142,7 +142,8 @@ def within(parameter: "Parameter", value: "Any") -> bool:
 
 
 def _near(value: float, other: float) -> bool:
-    return abs(value - other) <= _ROUNDING * abs(value + other)
+    gap = abs(value - other)
+    return gap - gap == 0 and gap <= _ROUNDING * abs(value + other)  # no rounding makes it infinite
 
 
 def _judge(
