@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from muros.rclc import CapacityError, Executor, RclError, TransitionError, lifecycle_states, lifecycles
 from muros.rclc.lifecycle import Lifecycle
@@ -296,3 +298,38 @@ def test_callbacks_must_be_callable(name: str) -> None:
     with pytest.raises(TypeError, match="a callback of a lifecycle is a function, not 5") as caught:
         Board(World()).node.lifecycle(**wrong)
     assert getattr(caught.value, "code", None) == 11
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([*LABELS[:5], "fly", *range(9), 10, 60]),
+            st.sampled_from([97, 98, 99, None, False]),
+        ),
+        max_size=30,
+    ),
+    st.sampled_from([97, 98, 99]),
+)
+def test_whatever_is_asked_every_step_is_one_of_the_table(
+    asked: list[tuple[int | str, object]], on_error: int
+) -> None:
+    result: object = None
+    does: Any = {name: lambda: result for name in LABELS[:5]} | {"error": lambda: on_error}
+    managed = Managed(**does)
+    known = {(row["id"], row["label"], row["start_id"], row["goal_id"]) for row in TABLE["transitions"]}
+    for transition, result in asked:
+        before, steps = managed.lifecycle.id, len(managed.events)
+        try:
+            done = managed.lifecycle.change(transition)
+        except TransitionError:
+            assert (managed.lifecycle.id, len(managed.events)) == (before, steps)
+            continue
+        assert done == (result in (97, None))
+        assert managed.lifecycle.id <= FINALIZED, "it never stays on the way"
+        at = before
+        for event in managed.events[steps:]:
+            step = (event.transition.id, event.transition.label, event.start_state.id, event.goal_state.id)
+            assert step in known
+            assert event.start_state.id == at
+            at = event.goal_state.id
+        assert at == managed.lifecycle.id
