@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from muros.client import reasons
-from muros.interfaces import message, service
 from muros.rclc import action_client as client_
 from muros.rclc import action_server as server_
 from muros.rclc import actions, goals
@@ -137,10 +137,11 @@ def make_client(node: Node, kind: Any, name: str, capacity: int) -> ActionClient
 
 
 def _types() -> tuple[Any, Any, Any]:
+    interfaces = import_module("muros.interfaces")  # a room above this one
     return (
-        service("action_msgs/srv/CancelGoal"),
-        message("action_msgs/msg/GoalStatusArray"),
-        message("action_msgs/msg/GoalStatus"),
+        interfaces.service("action_msgs/srv/CancelGoal"),
+        interfaces.message("action_msgs/msg/GoalStatusArray"),
+        interfaces.message("action_msgs/msg/GoalStatus"),
     )
 
 
