@@ -8,11 +8,11 @@ import pytest
 
 from muros.client import Session, Udp
 from muros.links import UdpLink
-from muros.rclc import ActionClient, ActionServer, CapacityError, Context, RclError
+from muros.rclc import ActionClient, ActionServer, CapacityError, Context, Executor, RclError
 from muros.rclc.action_client import SentGoal
 from muros.rclc.goals import Goal
 from tests.client.agent_thread import RunningAgent
-from tests.rclc_space.ways import Stage
+from tests.rclc_space.ways import PATIENCE, Stage
 
 from action_msgs.msg import GoalStatusArray
 from example_interfaces.action import Fibonacci
@@ -487,3 +487,38 @@ def test_a_result_that_was_lost_is_asked_for_again(stage: Stage) -> None:
     goal = pair.send(1)
     assert pair.result(goal) == [0, 1, 1]
     assert robber.asked == 2
+
+
+def test_an_executor_counts_an_action_as_one_handle() -> None:
+    context = Context("local:")
+    node = context.node("both")
+    server = node.action_server(Fibonacci, "count", count)
+    client = node.action_client(Fibonacci, "count")
+    executor = Executor(context, handles=2)
+    executor.add(server)
+    executor.add(client)
+    with pytest.raises(CapacityError, match="2 handles of 2"):
+        executor.add(node.timer(1.0, lambda: None))
+    results: list[list[int]] = []
+    client.send_goal(Fibonacci.Goal(order=2), on_result=lambda goal, result: results.append(result.sequence))
+    end = time.monotonic() + PATIENCE
+    while not results:
+        assert time.monotonic() < end
+        executor.spin_some(0.1)
+    assert list(results[0]) == [0, 1, 1, 2]
+    executor.remove(client)
+    client.destroy()
+    node.destroy()
+    context.close()
+
+
+def test_a_server_that_was_destroyed_says_nothing_more(stage: Stage) -> None:
+    kept: list[Goal] = []
+    pair = Pair(stage, kept.append)
+    goal = pair.send(1)
+    pair.until_executing(goal)
+    pair.server.destroy()
+    assert kept[0].feedback(Fibonacci.Feedback()) is False
+    kept[0].succeed(Fibonacci.Result())
+    assert pair.server.lost == 1
+    stage.until(lambda: True)

@@ -15,8 +15,8 @@ from muros.compat import MPY, borrow, const
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.client.qos import Qos as Qos
-    from muros.rclc.action_client import ActionClient as ActionClient
-    from muros.rclc.action_server import ActionServer as ActionServer
+    from muros.rclc.action_hosts import ActionClient as ActionClient
+    from muros.rclc.action_hosts import ActionServer as ActionServer
     from muros.rclc.errors import CapacityError as CapacityError
     from muros.rclc.errors import InvalidNameError as InvalidNameError
     from muros.rclc.errors import RclError as RclError
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from muros.rclc.lifecycle_client import LifecycleClient as LifecycleClient
     from muros.rclc.logger import Logger as Logger
     from muros.rclc.middleware import register as register
-    from muros.rclc.parameter_files import ParameterClient as ParameterClient
     from muros.rclc.parameter_errors import ParameterError as ParameterError
     from muros.rclc.parameter_errors import ParameterNotDeclaredError as ParameterNotDeclaredError
     from muros.rclc.parameter_errors import ParameterRejectedError as ParameterRejectedError
     from muros.rclc.parameter_errors import ParameterTypeError as ParameterTypeError
+    from muros.rclc.parameter_files import ParameterClient as ParameterClient
     from muros.rclc.parameters import Parameter as Parameter
     from muros.rclc.parameters import Parameters as Parameters
     from muros.rclc.ros_time import RosTime as RosTime
