@@ -3,7 +3,7 @@
 from muros.client.names import resolve, topic_name
 from muros.compat import borrow, const
 
-_INFO = const(20)
+_WORTH_KNOWING = const(20)  # ROS 2's level "info"
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -189,7 +189,7 @@ def action_client(self: "Node", kind: "Any", name: str, goals: int = 0) -> "Acti
 
 def logger(
     self: "Node",
-    level: "Any" = _INFO,
+    level: "Any" = _WORTH_KNOWING,
     time: "Callable[[], tuple[int, int]] | None" = None,
     show: "Callable[[str], object] | None" = print,
 ) -> "Logger":
