@@ -1,7 +1,13 @@
 """Actions of programs and of rclpy, both ways, and `muros action` on those of rclpy."""
 
+import os
+import shlex
+import signal
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -25,12 +31,18 @@ def ros(request: pytest.FixtureRequest) -> Iterator[Peer]:
 
 
 @pytest.fixture(scope="module")
-def kind(tmp_path_factory: pytest.TempPathFactory) -> Any:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The definition of the action of the peers' tests."""
+    made = tmp_path_factory.mktemp("types") / "test_msgs"
+    (made / "action").mkdir(parents=True)
+    (made / "action/Fibonacci.action").write_text(FIBONACCI)
+    return made
+
+
+@pytest.fixture(scope="module")
+def kind(folder: Path) -> Any:
     """The action of the peers' tests."""
-    folder = tmp_path_factory.mktemp("types") / "test_msgs/action"
-    folder.mkdir(parents=True)
-    (folder / "Fibonacci.action").write_text(FIBONACCI)
-    interfaces.add_path(folder.parent)
+    interfaces.add_path(folder)
     return interfaces.action(TYPE)
 
 
@@ -121,3 +133,33 @@ def test_we_send_goals_to_rclpy(context: Context, ros: Peer, kind: Any, dds_url:
     assert goal.status == CANCELED
     assert list(goal.result.sequence)[:4] == [0, 1, 1, 2]
     assert client.goals == []
+
+
+def test_the_command_and_rclpy(context: Context, ros: Peer, folder: Path, dds_url: str) -> None:
+    domain = int(dds_url.partition(":")[2])
+    node = ros.do("node", name="counter", domain=domain)
+    ros.do("action_server", node=node, name="/count", type=TYPE, period=0.02)
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+
+    def run(line: str, number: int = 0) -> str:
+        command = [sys.executable, "-m", "muros", "action", *shlex.split(line)]
+        with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            said = ""
+            while number and "accepted" not in said:
+                said += process.stdout.readline()
+            if number:
+                process.send_signal(number)
+            said += process.stdout.read()
+            assert process.wait(PATIENCE) == (130 if number else 0)
+        return said
+
+    assert run("list -t") == f"/count [{TYPE}]\n"
+    assert run("info /count") == "Action: /count\nAction clients: 0\nAction servers: 1\n    /counter\n"
+    said = run(f"send_goal -f /count {TYPE} '{{order: 2}}' --types {folder}")
+    assert said.count("Feedback:\n") == 2
+    assert said.endswith(
+        "Result:\n    sequence:\n- 0\n- 1\n- 1\n- 2\n\nGoal finished with status: SUCCEEDED\n"
+    )
+    said = run(f"send_goal /count {TYPE} '{{order: 500}}' --types {folder}", signal.SIGINT)
+    assert said.endswith("Canceling goal...\nGoal canceled.\n")
