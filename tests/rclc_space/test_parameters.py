@@ -145,9 +145,21 @@ def keeping(seen: Changes, agrees: list[bool]) -> Callable[[Parameter | None, Pa
     return decide
 
 
+_ALONE: list[Context] = []
+
+
+@pytest.fixture(autouse=True)
+def _leave_nobody() -> Iterator[None]:
+    """Contexts that a test opened for itself end with it."""
+    yield
+    while _ALONE:
+        _ALONE.pop().close()
+
+
 def node_alone() -> Node:
     """A node that nobody else needs to see."""
-    return Context("local:").node("server")
+    _ALONE.append(Context("local:"))
+    return _ALONE[-1].node("server")
 
 
 def names(parameters: Any) -> list[str]:

@@ -27,18 +27,24 @@ async def until(so: Callable[[], object]) -> None:
 
 def listing() -> None:
     """Which interfaces count."""
+    asyncio.run(_listing())
+
+
+async def _listing() -> None:
+    """The kernel tells of cables a moment later."""
     assert interfaces() == ()
     ip("link set lo up")
-    assert names() == ["lo"]
+    await until(lambda: names() == ["lo"])
     ip("link add v0 type veth peer name v1")
     ip("addr add 10.1.0.1/24 dev v0")
     assert names() == ["lo"]  # not up
     ip("link set v0 up")
     assert names() == ["lo"]  # no cable
     ip("link set v1 up")
-    assert names() == ["v0", "lo"]  # v1 has no address
+    await until(lambda: names() == ["v0", "lo"])  # v1 has no address
     ip("addr add 10.1.0.9/24 dev v0 label v0:more")
     ip("addr add 10.2.0.1/24 dev v1")
+    await until(lambda: len(interfaces()) == 3)
     v1, v0, lo = interfaces()
     assert v1.index < v0.index
     assert (v0.name, v0.addresses, v0.loopback, v0.multicast) == ("v0", ("10.1.0.1", "10.1.0.9"), False, True)

@@ -29,7 +29,7 @@ class Managed(LifecycleNode):  # type: ignore[misc]
         return self._done("activate")
 
 
-class Ros(ros.Ros):
+class Ros(ros.Ros):  # type: ignore[misc]
     """What the other side can ask for besides."""
 
     def lifecycle_node(self, name: str, domain: int, namespace: str, fails: list[str]) -> int:
@@ -41,7 +41,7 @@ class Ros(ros.Ros):
         executor.add_node(node)
         threading.Thread(target=executor.spin, daemon=True).start()
         self.contexts.append((context, node))
-        return self._keep(node)
+        return int(self._keep(node))
 
 
 if __name__ == "__main__":
