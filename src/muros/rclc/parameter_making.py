@@ -83,14 +83,14 @@ def declare(
     no parameter, ParameterRejectedError for a value out of range, ParameterMemoryError for words in the low-memory
     profile.
     """
-    from muros.rclc import parameter_errors as errors
+    from muros.rclc.parameter_errors import InvalidParameterError, ParameterError, ParameterRejectedError
 
     busy(self)
     if not isinstance(name, str) or not name:
-        raise errors.InvalidParameterError("the name of a parameter is a text, not %r" % (name,))
+        raise InvalidParameterError("the name of a parameter is a text, not %r" % (name,))
     _be_short(self, name, "the name of a parameter")
     if name in self.known:
-        raise errors.ParameterError("%s has a parameter %r already" % (self.full_name, name))
+        raise ParameterError("%s has a parameter %r already" % (self.full_name, name))
     if self.max and len(self.known) >= self.max:
         from muros.rclc.errors import CapacityError
 
@@ -100,7 +100,7 @@ def declare(
         )
     kind = kind_of(value, type) or (type if type == _BYTES and value == [] else 0)
     if kind == 0 or not is_type(type) or (type and kind != type):
-        raise errors.InvalidParameterError(
+        raise InvalidParameterError(
             "parameter %r cannot be %r: a value is a bool, int, float, str, bytes, or a list of one of these; "
             "say with type= what an empty list is" % (name, value)
         )
@@ -110,7 +110,7 @@ def declare(
     if range is not None:
         made.range = _range(made, range)
         if not within(made, value):
-            raise errors.ParameterRejectedError(
+            raise ParameterRejectedError(
                 "parameter %r cannot be %r: that is not in its range %r" % (name, value, made.range)
             )
     _describe(self, made, description, constraints)

@@ -200,14 +200,14 @@ def _message(self: "Parameters", parameter: "Parameter") -> "Any":
 
 def _refuse(self: "Parameters", code: int, why: str, wanted: "list[tuple[str, int, Any]]") -> None:
     """Raises what stands against a change that the program wants."""
-    from muros.rclc import parameter_errors as errors
+    from muros.rclc.parameter_errors import ParameterRejectedError, ParameterTypeError
 
     for name, kind, _ in wanted:
         found = self.known.get(name)
         if found is None and not self.undeclared:
             unknown(self, name)
         if code == _TYPE_MISMATCH and found is not None and found.type != kind:
-            raise errors.ParameterTypeError(
+            raise ParameterTypeError(
                 "parameter %r of %s is of type %s, not %s"
                 % (name, self.full_name, TYPES[found.type], TYPES[kind])
             )
@@ -219,4 +219,4 @@ def _refuse(self: "Parameters", code: int, why: str, wanted: "list[tuple[str, in
             % (self.full_name, self.max, self.max + 1)
         )
     names = ", ".join([name for name, _, _ in wanted])
-    raise errors.ParameterRejectedError("%s of %s is not set: %s" % (names, self.full_name, why))
+    raise ParameterRejectedError("%s of %s is not set: %s" % (names, self.full_name, why))
