@@ -23,7 +23,7 @@ def test_logging(bench: Bench) -> None:
     got: list[Any] = []
     bench.node.subscription(LOG, "/rosout", got.append, qos="rosout")
     running = bench.start(GUIDE, 0)
-    bench.until(lambda: got)
+    bench.until(lambda: got and len(running.lines) >= 2)
     assert (got[0].level, got[0].name, got[0].msg) == (30, "greenhouse.thermometer", "it is too hot")
     assert got[0].stamp.sec > 1_700_000_000
     assert got[0].file.endswith("program.py")
@@ -91,6 +91,6 @@ def test_both_on_micropython(bench: Bench, tmp_path: Path) -> None:
     bench.until(lambda: bench.events.count("ClientReady") >= 1)
     shown = run_mpy(BOARD, [str(bench.link.port)], library=(ROOT / "src", tmp_path))
     assert shown.splitlines()[-1] == "[WARN] [5.250000000] [lab.board]: done"
-    bench.until(lambda: got)
+    bench.until(lambda: got and len(running.lines) >= 2)
     assert (got[-1].level, got[-1].name, got[-1].msg) == (30, "lab.board", "done")
     assert (got[-1].stamp.sec, got[-1].stamp.nanosec) == (5, 250_000_000)
