@@ -72,6 +72,11 @@ class EngineEndpoint(Closing):
         return self.participant.owner
 
     @property
+    def endpoints(self) -> tuple[EngineEndpoint, ...]:
+        """Itself, as a service's side has its reader and its writer."""
+        return (self,)
+
+    @property
     def deadline_missed(self) -> int:
         """Periods of the deadline that passed without a sample."""
         return 0 if self.deadline is None else self.deadline.missed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from itertools import count
-from typing import Final, TypeAlias
+from typing import Any, Final, Generic, NamedTuple, TypeAlias, TypeVar, cast
 
 from muros.findings import Severity
 from muros.space._core import Core
@@ -14,8 +14,9 @@ from muros.space._endpoint import Closing, EngineEndpoint
 from muros.space._graph import ParticipantInfo, full_name
 from muros.space._qos import Durability, Qos
 from muros.space._services import EngineReplier, EngineRequester
+from muros.space._values import Service, Topic
 
-__all__ = ["READER_KIND", "WRITER_KIND", "Child", "EngineParticipant", "prefix_of", "prefixes"]
+__all__ = ["Child", "EngineParticipant", "Makers", "prefix_of", "prefixes"]
 
 WRITER_KIND: Final = 0x03
 """Entity kind of a user's writer without key (DDSI-RTPS 2.5, 9.3.1.2)."""
@@ -31,13 +32,34 @@ FIRST_NUMBER: Final = 0x800000
 
 Child: TypeAlias = EngineEndpoint | EngineRequester | EngineReplier
 
+_Writer = TypeVar("_Writer", bound=EngineEndpoint)
+_Reader = TypeVar("_Reader", bound=EngineEndpoint)
+_Requester = TypeVar("_Requester", bound=EngineRequester)
+_Replier = TypeVar("_Replier", bound=EngineReplier)
 
-class EngineParticipant(Closing):
-    """Somebody in the space. See `muros.space.Participant`. An engine makes its entities and takes them out."""
+
+class Makers(NamedTuple, Generic[_Writer, _Reader, _Requester, _Replier]):
+    """What an engine makes the entities of its participants with; they are not open yet."""
+
+    writer: Callable[[Any, Topic, Qos, bytes], _Writer]
+    """Of a participant, a topic, QoS and a gid; a reader also of what it calls when something has come."""
+    reader: Callable[[Any, Topic, Qos, bytes, Callable[[Any], object] | None], _Reader]
+    requester: Callable[..., _Requester]
+    """Of a participant, a service, QoS, gids of writer and reader, and the two callbacks of the door."""
+    replier: Callable[..., _Replier]
+
+
+class EngineParticipant(Closing, Generic[_Writer, _Reader, _Requester, _Replier]):
+    """Somebody in the space. See `muros.space.Participant`.
+
+    An engine says what it makes (`makers`), opens it for others (`open_child`) and takes it out (`take_out`).
+    """
 
     __slots__ = (
         "_children", "_next", "closed", "core", "domain", "enclave", "gid", "name", "namespace", "owner",
     )  # fmt: skip
+
+    makers: Makers[_Writer, _Reader, _Requester, _Replier]
 
     def __init__(
         self, core: Core, domain: int, prefix: bytes, name: str, namespace: str, enclave: str, owner: str
@@ -52,6 +74,75 @@ class EngineParticipant(Closing):
         self.closed = False
         self._children: list[Child] = []
         self._next = FIRST_NUMBER
+
+    def writer(self, topic: Topic, qos: Qos | None = None, *, key: int | None = None) -> _Writer:
+        """A new writer."""
+        qos = self.settled(qos, "dds_writer", topic.name, holds=False)
+        gids = self.gids(key, WRITER_KIND)
+        writer = self.makers.writer(self, topic, qos, gids[0])
+        self.open_child(writer, gids, writer)
+        return writer
+
+    def reader(
+        self,
+        topic: Topic,
+        qos: Qos | None = None,
+        on_data: Callable[[Any], object] | None = None,
+        *,
+        key: int | None = None,
+    ) -> _Reader:
+        """A new reader."""
+        qos = self.settled(qos, "dds_reader", topic.name)
+        gids = self.gids(key, READER_KIND)
+        reader = self.makers.reader(self, topic, qos, gids[0], on_data)
+        self.open_child(reader, gids, reader)
+        return reader
+
+    def requester(
+        self,
+        service: Service,
+        qos: Qos | None = None,
+        on_reply: Callable[[int, bytes], object] | None = None,
+        *,
+        on_data: Callable[[Any], object] | None = None,
+        key: int | None = None,
+    ) -> _Requester:
+        """A new client of a service."""
+        qos = self.settled(qos, "services_default", service.name)
+        gids = self.gids(key, WRITER_KIND, READER_KIND)
+        requester = self.makers.requester(self, service, qos, *gids, on_reply, on_data)
+        self.open_child(requester, gids, *self.parts(requester))
+        return requester
+
+    def replier(
+        self,
+        service: Service,
+        qos: Qos | None = None,
+        on_request: Callable[[bytes, bytes], object] | None = None,
+        *,
+        on_data: Callable[[Any], object] | None = None,
+        key: int | None = None,
+    ) -> _Replier:
+        """A new server of a service."""
+        qos = self.settled(qos, "services_default", service.name)
+        gids = self.gids(key, WRITER_KIND, READER_KIND)
+        replier = self.makers.replier(self, service, qos, *gids, on_request, on_data)
+        self.open_child(replier, gids, *reversed(self.parts(replier)))  # no request may come before
+        return replier
+
+    def open_child(self, child: Child, gids: list[bytes], *endpoints: _Writer | _Reader) -> None:
+        """`child` is one of the children from now on; `endpoints`, its parts, come into the space in this order."""
+        raise NotImplementedError
+
+    @property
+    def endpoints(self) -> tuple[_Writer | _Reader, ...]:
+        """The writers and readers made here, those of services too."""
+        return tuple(endpoint for child in self._children for endpoint in self.parts(child))
+
+    @staticmethod
+    def parts(child: Child) -> tuple[_Writer | _Reader, ...]:
+        """What a child is made of: itself, or the reader and the writer of its side of a service."""
+        return cast("tuple[_Writer | _Reader, ...]", child.endpoints)
 
     def in_use(self, gid: bytes) -> bool:
         """Whether one of its endpoints has this gid."""

@@ -24,13 +24,10 @@ class Parent(Protocol):
         """Take one of its children out of the space, unless it is closed already."""
 
 
-class EngineRequester(Closing):
-    """The client's side of a service. See `muros.space.Requester`. An engine says how a request goes.
+class _Side(Closing):
+    """What the two sides of a service have in common. Subclasses make `writer` and `reader`, which calls `announce`."""
 
-    Subclasses make `writer` and `reader`; the reader's `on_data` is `announce`.
-    """
-
-    __slots__ = ("_on_data", "_on_reply", "_parent", "_timer", "_waiting", "qos", "service")
+    __slots__ = ("_on_data", "_on_one", "_parent", "qos", "service")
 
     reader: CachingReader
     writer: EngineEndpoint
@@ -40,31 +37,73 @@ class EngineRequester(Closing):
         parent: Parent,
         service: Service,
         qos: Qos,
-        on_reply: Callable[[int, bytes], object] | None,
+        on_one: Callable[[Any, bytes], object] | None,
         on_data: Callable[[Any], object] | None,
     ) -> None:
         self.service = service
         self.qos = qos
         self._parent = parent
-        self._on_reply = on_reply
+        self._on_one = on_one
+        """Told of each reply or request: whose it is, and its body."""
         self._on_data = on_data
-        self._waiting: deque[tuple[int, Sample]] | None = None
-        self._timer: Timer | None = None
 
     @property
     def announce(self) -> Callable[[CachingReader], None] | None:
-        """What the reader of replies calls."""
-        return None if self._on_reply is None and self._on_data is None else self._came
+        """What the reader calls."""
+        return None if self._on_one is None and self._on_data is None else self._came
 
     @property
     def gid(self) -> bytes:
-        """Gid of the writer of its requests."""
+        """Gid of the writer."""
         return self.writer.gid
 
     @property
     def closed(self) -> bool:
         """Whether it has been closed."""
         return self.writer.closed
+
+    @property
+    def endpoints(self) -> tuple[EngineEndpoint, ...]:
+        """What it is made of."""
+        return (self.reader, self.writer)
+
+    def take(self) -> Reply | Request | None:
+        """The oldest that has come, None if there is none."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Take it out of the space."""
+        self._parent.close_child(self)
+
+    def detach(self) -> None:
+        """It has been taken out of the space."""
+        self.writer.detach()
+        self.reader.detach()
+
+    def _came(self, reader: CachingReader) -> None:
+        if self._on_data is not None:
+            self._on_data(self)
+            return
+        while self._on_one is not None and (taken := self.take()) is not None:
+            self.writer.core.call(self.writer.owner, self._on_one, taken[0], taken.data)
+
+
+class EngineRequester(_Side):
+    """The client's side of a service. See `muros.space.Requester`. An engine says how a request goes."""
+
+    __slots__ = ("_timer", "_waiting")
+
+    def __init__(
+        self,
+        parent: Parent,
+        service: Service,
+        qos: Qos,
+        on_reply: Callable[[int, bytes], object] | None,
+        on_data: Callable[[Any], object] | None,
+    ) -> None:
+        super().__init__(parent, service, qos, on_reply, on_data)
+        self._waiting: deque[tuple[int, Sample]] | None = None
+        self._timer: Timer | None = None
 
     @property
     def servers(self) -> int:
@@ -125,23 +164,11 @@ class EngineRequester(Closing):
             waiting.popleft()
         self._schedule()
 
-    def close(self) -> None:
-        """Take it out of the space."""
-        self._parent.close_child(self)
-
     def detach(self) -> None:
         """It has been taken out of the space."""
         self._waiting = None
         self._schedule()
-        self.writer.detach()
-        self.reader.detach()
-
-    def _came(self, reader: CachingReader) -> None:
-        if self._on_data is not None:
-            self._on_data(self)
-            return
-        while self._on_reply is not None and (reply := self.take()) is not None:
-            self.writer.core.call(self.writer.owner, self._on_reply, reply.sequence, reply.data)
+        super().detach()
 
     def _refuse(self) -> None:
         core, who, name = self.writer.core, self.writer.owner, self.service.name
@@ -189,45 +216,10 @@ class EngineRequester(Closing):
         _reports.request_overwritten(writer.core, writer.owner, self.service.name, writer.limit, n)
 
 
-class EngineReplier(Closing):
-    """The server's side of a service. See `muros.space.Replier`. An engine says how a reply goes.
+class EngineReplier(_Side):
+    """The server's side of a service. See `muros.space.Replier`. An engine says how a reply goes."""
 
-    Subclasses make `writer` and `reader`; the reader's `on_data` is `announce`.
-    """
-
-    __slots__ = ("_on_data", "_on_request", "_parent", "qos", "service")
-
-    reader: CachingReader
-    writer: EngineEndpoint
-
-    def __init__(
-        self,
-        parent: Parent,
-        service: Service,
-        qos: Qos,
-        on_request: Callable[[bytes, bytes], object] | None,
-        on_data: Callable[[Any], object] | None,
-    ) -> None:
-        self.service = service
-        self.qos = qos
-        self._parent = parent
-        self._on_request = on_request
-        self._on_data = on_data
-
-    @property
-    def announce(self) -> Callable[[CachingReader], None] | None:
-        """What the reader of requests calls."""
-        return None if self._on_request is None and self._on_data is None else self._came
-
-    @property
-    def gid(self) -> bytes:
-        """Gid of the writer of its replies."""
-        return self.writer.gid
-
-    @property
-    def closed(self) -> bool:
-        """Whether it has been closed."""
-        return self.writer.closed
+    __slots__ = ()
 
     @property
     def clients(self) -> int:
@@ -262,19 +254,3 @@ class EngineReplier(Closing):
         core, who, name = self.writer.core, self.writer.owner, self.service.name
         core.count("reply-unmatched", who, name, partial(_reports.reply_unmatched, core, who, name))
         core.drain()
-
-    def close(self) -> None:
-        """Take it out of the space."""
-        self._parent.close_child(self)
-
-    def detach(self) -> None:
-        """It has been taken out of the space."""
-        self.writer.detach()
-        self.reader.detach()
-
-    def _came(self, reader: CachingReader) -> None:
-        if self._on_data is not None:
-            self._on_data(self)
-            return
-        while self._on_request is not None and (request := self.take()) is not None:
-            self.writer.core.call(self.writer.owner, self._on_request, request.identity, request.data)

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from muros.findings import Findings
 from muros.space._core import Core, Engine, Limits
 from muros.space._door import ClosedError
-from muros.space._endpoint import Closing
-from muros.space._participant import EngineParticipant
+from muros.space._endpoint import Closing, Home
 
 __all__ = ["EngineSpace"]
 
@@ -51,7 +50,7 @@ class EngineSpace(Closing):
         if self.closed:
             raise ClosedError("the space is closed; open another one")
 
-    def check_free(self, key: bytes | None, holder: EngineParticipant | None) -> None:
+    def check_free(self, key: bytes | None, holder: Home | None) -> None:
         """ValueError if somebody has the key of a new participant."""
         if holder is not None:
             raise ValueError(f"key {key!r} is in use by {holder.owner}; close it first, or take another key")

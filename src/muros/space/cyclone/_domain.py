@@ -49,6 +49,7 @@ from muros.space.dds._discovery_info import (
     DiscoveryInfo,
     InvalidDiscoveryInfo,
     NodeEntities,
+    told_by,
 )
 from muros.space.dds._names import service_of, type_hash
 
@@ -547,7 +548,7 @@ class CycloneDomain:
         from cyclonedds._clayer import ddspy_write
 
         if participant.told is not None:
-            body = participant.told_entities().body(self._gid_size)
+            body = told_by(participant).body(self._gid_size)
             ddspy_write(participant.told._ref, encapsulated(body))
 
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from muros.space._core import Core
 from muros.space._door import SpaceError
 from muros.space._graph import Appeared, Vanished
-from muros.space._participant import READER_KIND, WRITER_KIND, Child, EngineParticipant
-from muros.space._qos import Qos
-from muros.space._values import Service, Topic
+from muros.space._participant import Child, EngineParticipant, Makers
+from muros.space._values import Topic
 from muros.space.cyclone._endpoints import CycloneReader, CycloneWriter
 from muros.space.cyclone._opaque import opaque_type, unannounced
 from muros.space.cyclone._policies import to_policies
 from muros.space.cyclone._services import CycloneReplier, CycloneRequester
-from muros.space.dds._discovery_info import DiscoveryInfo, NodeEntities
 
 if TYPE_CHECKING:
     from muros.space.cyclone._domain import CycloneDomain
@@ -23,13 +20,24 @@ if TYPE_CHECKING:
 __all__ = ["CycloneParticipant", "delete"]
 
 
-class CycloneParticipant(EngineParticipant):
+class CycloneParticipant(EngineParticipant[CycloneWriter, CycloneReader, CycloneRequester, CycloneReplier]):
     """Somebody in the space. See `muros.space.Participant`.
 
     Keys say which numbers are in use, but Cyclone chooses the gids.
     """
 
     __slots__ = ("_claims", "_topics", "entity", "home", "key", "told")
+
+    makers = Makers(
+        lambda participant, topic, qos, _: CycloneWriter(participant, topic, qos),
+        lambda participant, topic, qos, _, on_data: CycloneReader(participant, topic, qos, on_data),
+        lambda participant, service, qos, *gids_and_callbacks: CycloneRequester(
+            participant, service, qos, *gids_and_callbacks[2:]
+        ),
+        lambda participant, service, qos, *gids_and_callbacks: CycloneReplier(
+            participant, service, qos, *gids_and_callbacks[2:]
+        ),
+    )
 
     def __init__(
         self,
@@ -49,61 +57,6 @@ class CycloneParticipant(EngineParticipant):
         """Tells others of the node."""
         self._claims: dict[bytes, Child] = {}
         self._topics: dict[Topic, Any] = {}
-
-    def writer(self, topic: Topic, qos: Qos | None = None, *, key: int | None = None) -> CycloneWriter:
-        """A new writer."""
-        qos = self.settled(qos, "dds_writer", topic.name, holds=False)
-        claims = self.gids(key, WRITER_KIND)
-        writer = CycloneWriter(self, topic, qos)
-        self._add(writer, claims, writer)
-        return writer
-
-    def reader(
-        self,
-        topic: Topic,
-        qos: Qos | None = None,
-        on_data: Callable[[Any], object] | None = None,
-        *,
-        key: int | None = None,
-    ) -> CycloneReader:
-        """A new reader."""
-        qos = self.settled(qos, "dds_reader", topic.name)
-        claims = self.gids(key, READER_KIND)
-        reader = CycloneReader(self, topic, qos, on_data)
-        self._add(reader, claims, reader)
-        return reader
-
-    def requester(
-        self,
-        service: Service,
-        qos: Qos | None = None,
-        on_reply: Callable[[int, bytes], object] | None = None,
-        *,
-        on_data: Callable[[Any], object] | None = None,
-        key: int | None = None,
-    ) -> CycloneRequester:
-        """A new client of a service."""
-        qos = self.settled(qos, "services_default", service.name)
-        claims = self.gids(key, WRITER_KIND, READER_KIND)
-        requester = CycloneRequester(self, service, qos, on_reply, on_data)
-        self._add(requester, claims, requester.reader, requester.writer)
-        return requester
-
-    def replier(
-        self,
-        service: Service,
-        qos: Qos | None = None,
-        on_request: Callable[[bytes, bytes], object] | None = None,
-        *,
-        on_data: Callable[[Any], object] | None = None,
-        key: int | None = None,
-    ) -> CycloneReplier:
-        """A new server of a service."""
-        qos = self.settled(qos, "services_default", service.name)
-        claims = self.gids(key, WRITER_KIND, READER_KIND)
-        replier = CycloneReplier(self, service, qos, on_request, on_data)
-        self._add(replier, claims, replier.writer, replier.reader)
-        return replier
 
     def close(self) -> None:
         """Leave the space with everything made here, in one go."""
@@ -132,7 +85,7 @@ class CycloneParticipant(EngineParticipant):
     def take_out(self, child: Child) -> None:
         """Take a child out of the space."""
         self._claims = {claim: other for claim, other in self._claims.items() if other is not child}
-        for endpoint in _endpoints(child):
+        for endpoint in self.parts(child):
             self.home.forget(endpoint)
             if self.core.watchers:
                 self.core.tell(Vanished(endpoint.info()))
@@ -141,20 +94,8 @@ class CycloneParticipant(EngineParticipant):
         self.home.changed(self)
         self.home.fetch()
 
-    def told_entities(self) -> DiscoveryInfo:
-        """What others are to know of its node.
-
-        One that goes says that it has none: Fast DDS does not understand Cyclone's word for that, and would believe
-        in the node until the lease is over.
-        """
-        if self.closed:
-            return DiscoveryInfo(self.gid, ())
-        endpoints = [endpoint for child in self._children for endpoint in _endpoints(child)]
-        readers = tuple(endpoint.gid for endpoint in endpoints if isinstance(endpoint, CycloneReader))
-        writers = tuple(endpoint.gid for endpoint in endpoints if isinstance(endpoint, CycloneWriter))
-        return DiscoveryInfo(self.gid, (NodeEntities(self.namespace, self.name, readers, writers),))
-
-    def _add(self, child: Child, claims: list[bytes], *endpoints: CycloneReader | CycloneWriter) -> None:
+    def open_child(self, child: Child, gids: list[bytes], *endpoints: CycloneReader | CycloneWriter) -> None:
+        """Have Cyclone make the endpoints of a new child, and tell of the node that has them."""
         home = self.home
         with self.core.hushed():
             for endpoint in endpoints:
@@ -164,7 +105,7 @@ class CycloneParticipant(EngineParticipant):
                     self.core.tell(Appeared(endpoint.info()))
                 home.compare(endpoint)
             self._children.append(child)
-            self._claims.update(dict.fromkeys(claims, child))
+            self._claims.update(dict.fromkeys(gids, child))
             home.fetch()
         home.changed(self)
         self.core.settle()
@@ -202,10 +143,3 @@ class CycloneParticipant(EngineParticipant):
 def delete(entity: Any) -> None:
     """Have Cyclone delete an entity now; it would otherwise when nobody holds it any more."""
     entity.__del__()
-
-
-def _endpoints(child: Child) -> tuple[CycloneReader | CycloneWriter, ...]:
-    if isinstance(child, CycloneReader | CycloneWriter):
-        return (child,)
-    assert isinstance(child, CycloneRequester | CycloneReplier)
-    return (child.reader, child.writer)

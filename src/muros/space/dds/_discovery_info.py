@@ -7,8 +7,11 @@ found by what parses exactly.
 """
 
 import struct
-from typing import Final, NamedTuple
+from collections.abc import Sequence
+from typing import Final, NamedTuple, Protocol
 
+from muros.space._endpoint import EngineEndpoint
+from muros.space._graph import Role
 from muros.space._qos import Durability, Qos
 from muros.space._values import CDR_BE, CDR_LE, GID_SIZE, Topic
 
@@ -21,6 +24,7 @@ __all__ = [
     "DiscoveryInfo",
     "InvalidDiscoveryInfo",
     "NodeEntities",
+    "told_by",
 ]
 
 INFO_TOPIC: Final = Topic("ros_discovery_info", "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_")
@@ -61,6 +65,19 @@ class NodeEntities(NamedTuple):
     writers: tuple[bytes, ...]
 
 
+class Told(Protocol):
+    """A participant, as far as others are told of it."""
+
+    gid: bytes
+    namespace: str
+    name: str
+    closed: bool
+
+    @property
+    def endpoints(self) -> Sequence[EngineEndpoint]:
+        """Its writers and readers."""
+
+
 class DiscoveryInfo(NamedTuple):
     """What one participant says."""
 
@@ -95,6 +112,23 @@ class DiscoveryInfo(NamedTuple):
             except (struct.error, _NotThisSize):
                 continue
         raise InvalidDiscoveryInfo(f"{len(body)} bytes fit neither size of gids")
+
+
+def told_by(participant: Told) -> DiscoveryInfo:
+    """What others are to know of a participant's node.
+
+    One that goes says that it has none: Fast DDS does not understand Cyclone's word for that, and would believe in the
+    node until the lease is over.
+    """
+    if participant.closed:
+        return DiscoveryInfo(participant.gid, ())
+    sides: dict[Role, list[bytes]] = {Role.READER: [], Role.WRITER: []}
+    for endpoint in participant.endpoints:
+        sides[endpoint.role].append(endpoint.gid)
+    readers, writers = map(tuple, sides.values())
+    return DiscoveryInfo(
+        participant.gid, (NodeEntities(participant.namespace, participant.name, readers, writers),)
+    )
 
 
 class _NotThisSize(Exception):  # noqa: N818

@@ -20,6 +20,7 @@ from muros.space.dds._discovery_info import (
     OLD_DISTROS,
     DiscoveryInfo,
     InvalidDiscoveryInfo,
+    told_by,
 )
 from muros.space.dds._endpoints import encapsulated
 from muros.space.dds._wire_qos import to_wire
@@ -112,7 +113,7 @@ class Nodes:
     def _write(self, participant: DdsParticipant) -> None:
         """Tell of one node as it is now."""
         if participant.told is not None:
-            payload = encapsulated(participant.told_entities().body(self._gid_size))
+            payload = encapsulated(told_by(participant).body(self._gid_size))
             participant.told.write(payload, self._home.now(), source_time=self._home.core.clock())
 
     def _hear(self, received: Received) -> bool:

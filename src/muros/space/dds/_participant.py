@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from muros import rtps
 from muros.rtps import split_guid
 from muros.space._core import Core
-from muros.space._endpoint import EngineEndpoint
 from muros.space._graph import Appeared, Vanished
-from muros.space._participant import READER_KIND, WRITER_KIND, Child, EngineParticipant
-from muros.space._qos import Qos
-from muros.space._values import Service, Topic
-from muros.space.dds._discovery_info import DiscoveryInfo, NodeEntities
+from muros.space._participant import Child, EngineParticipant, Makers
+from muros.space._values import Topic
 from muros.space.dds._endpoints import DdsEndpoint, DdsReader, DdsWriter
 from muros.space.dds._services import DdsReplier, DdsRequester
 from muros.space.dds._wire_qos import to_wire
@@ -25,10 +21,19 @@ if TYPE_CHECKING:
 __all__ = ["DdsParticipant"]
 
 
-class DdsParticipant(EngineParticipant):
+class DdsParticipant(EngineParticipant[DdsWriter, DdsReader, DdsRequester, DdsReplier]):
     """Somebody in the space. See `muros.space.Participant`."""
 
     __slots__ = ("home", "keyed", "rtps", "told")
+
+    makers = Makers(
+        lambda participant, topic, qos, gid: DdsWriter(participant, _typed(topic), qos, gid),
+        lambda participant, topic, qos, gid, on_data: DdsReader(
+            participant, _typed(topic), qos, gid, on_data
+        ),
+        DdsRequester,
+        DdsReplier,
+    )
 
     def __init__(
         self,
@@ -65,59 +70,6 @@ class DdsParticipant(EngineParticipant):
             if self.rtps.data.user_data != user_data:
                 self.rtps.set_user_data(user_data, home.now())
 
-    def writer(self, topic: Topic, qos: Qos | None = None, *, key: int | None = None) -> DdsWriter:
-        """A new writer."""
-        qos = self.settled(qos, "dds_writer", topic.name, holds=False)
-        writer = DdsWriter(self, _typed(topic), qos, self.gids(key, WRITER_KIND)[0])
-        self._add(writer, writer)
-        return writer
-
-    def reader(
-        self,
-        topic: Topic,
-        qos: Qos | None = None,
-        on_data: Callable[[Any], object] | None = None,
-        *,
-        key: int | None = None,
-    ) -> DdsReader:
-        """A new reader."""
-        qos = self.settled(qos, "dds_reader", topic.name)
-        reader = DdsReader(self, _typed(topic), qos, self.gids(key, READER_KIND)[0], on_data)
-        self._add(reader, reader)
-        return reader
-
-    def requester(
-        self,
-        service: Service,
-        qos: Qos | None = None,
-        on_reply: Callable[[int, bytes], object] | None = None,
-        *,
-        on_data: Callable[[Any], object] | None = None,
-        key: int | None = None,
-    ) -> DdsRequester:
-        """A new client of a service."""
-        qos = self.settled(qos, "services_default", service.name)
-        writer_gid, reader_gid = self.gids(key, WRITER_KIND, READER_KIND)
-        requester = DdsRequester(self, service, qos, writer_gid, reader_gid, on_reply, on_data)
-        self._add(requester, requester.reader, requester.writer)
-        return requester
-
-    def replier(
-        self,
-        service: Service,
-        qos: Qos | None = None,
-        on_request: Callable[[bytes, bytes], object] | None = None,
-        *,
-        on_data: Callable[[Any], object] | None = None,
-        key: int | None = None,
-    ) -> DdsReplier:
-        """A new server of a service."""
-        qos = self.settled(qos, "services_default", service.name)
-        writer_gid, reader_gid = self.gids(key, WRITER_KIND, READER_KIND)
-        replier = DdsReplier(self, service, qos, writer_gid, reader_gid, on_request, on_data)
-        self._add(replier, replier.writer, replier.reader)
-        return replier
-
     def close(self) -> None:
         """Leave the space with everything made here, in one go."""
         if self.closed:
@@ -143,17 +95,8 @@ class DdsParticipant(EngineParticipant):
         self.home.nodes.changed(self)
         self.home.poke()
 
-    def told_entities(self) -> DiscoveryInfo:
-        """What others are to know of its node."""
-        readers: list[bytes] = []
-        writers: list[bytes] = []
-        for child in self._children:
-            for endpoint in _endpoints(child):
-                (writers if isinstance(endpoint, DdsWriter) else readers).append(endpoint.gid)
-        node = NodeEntities(self.namespace, self.name, tuple(readers), tuple(writers))
-        return DiscoveryInfo(self.gid, () if self.closed else (node,))
-
-    def _add(self, child: Child, *endpoints: DdsEndpoint) -> None:
+    def open_child(self, child: Child, gids: list[bytes], *endpoints: DdsEndpoint) -> None:
+        """Announce the endpoints of a new child, and then the node that has them."""
         home = self.home
         self._children.append(child)
         with home.making():
@@ -197,20 +140,13 @@ class DdsParticipant(EngineParticipant):
 
     def _forget(self, child: Child) -> tuple[DdsEndpoint, ...]:
         """Take a child out of the books; RTPS has its endpoints still."""
-        endpoints = _endpoints(child)
+        endpoints = self.parts(child)
         for endpoint in endpoints:
             self.home.forget(endpoint)
             if self.core.watchers:
                 self.core.tell(Vanished(endpoint.info()))
         child.detach()
         return endpoints
-
-
-def _endpoints(child: Child) -> tuple[DdsEndpoint, ...]:
-    if isinstance(child, DdsWriter | DdsReader):
-        return (child,)
-    assert not isinstance(child, EngineEndpoint)
-    return (child.reader, child.writer)  # type: ignore[return-value]
 
 
 def _close(endpoints: tuple[DdsEndpoint, ...], now: int) -> None:

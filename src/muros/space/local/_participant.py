@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 from muros.space._core import Core
 from muros.space._endpoint import EngineEndpoint
 from muros.space._graph import Appeared, Vanished
-from muros.space._participant import READER_KIND, WRITER_KIND, Child, EngineParticipant
-from muros.space._qos import Qos
-from muros.space._values import Service, Topic
+from muros.space._participant import Child, EngineParticipant, Makers
+from muros.space._values import Topic
 from muros.space.local._matching import TopicRecord
 from muros.space.local._reader import LocalReader
 from muros.space.local._services import LocalReplier, LocalRequester
@@ -31,10 +27,12 @@ class Domain:
         self.participants: dict[bytes, LocalParticipant] = {}
 
 
-class LocalParticipant(EngineParticipant):
+class LocalParticipant(EngineParticipant[LocalWriter, LocalReader, LocalRequester, LocalReplier]):
     """Somebody in the space. See `muros.space.Participant`."""
 
     __slots__ = ("home",)
+
+    makers = Makers(LocalWriter, LocalReader, LocalRequester, LocalReplier)
 
     def __init__(
         self, core: Core, home: Domain, prefix: bytes, name: str, namespace: str, enclave: str, owner: str
@@ -45,59 +43,6 @@ class LocalParticipant(EngineParticipant):
         if core.watchers:
             core.tell(Appeared(self.info()))
             core.settle()
-
-    def writer(self, topic: Topic, qos: Qos | None = None, *, key: int | None = None) -> LocalWriter:
-        """A new writer."""
-        qos = self.settled(qos, "dds_writer", topic.name, holds=False)
-        writer = LocalWriter(self, topic, qos, self.gids(key, WRITER_KIND)[0])
-        self._add(writer, writer)
-        return writer
-
-    def reader(
-        self,
-        topic: Topic,
-        qos: Qos | None = None,
-        on_data: Callable[[Any], object] | None = None,
-        *,
-        key: int | None = None,
-    ) -> LocalReader:
-        """A new reader."""
-        qos = self.settled(qos, "dds_reader", topic.name)
-        reader = LocalReader(self, topic, qos, self.gids(key, READER_KIND)[0], on_data)
-        self._add(reader, reader)
-        return reader
-
-    def requester(
-        self,
-        service: Service,
-        qos: Qos | None = None,
-        on_reply: Callable[[int, bytes], object] | None = None,
-        *,
-        on_data: Callable[[Any], object] | None = None,
-        key: int | None = None,
-    ) -> LocalRequester:
-        """A new client of a service."""
-        qos = self.settled(qos, "services_default", service.name)
-        writer_gid, reader_gid = self.gids(key, WRITER_KIND, READER_KIND)
-        requester = LocalRequester(self, service, qos, writer_gid, reader_gid, on_reply, on_data)
-        self._add(requester, requester.reader, requester.writer)
-        return requester
-
-    def replier(
-        self,
-        service: Service,
-        qos: Qos | None = None,
-        on_request: Callable[[bytes, bytes], object] | None = None,
-        *,
-        on_data: Callable[[Any], object] | None = None,
-        key: int | None = None,
-    ) -> LocalReplier:
-        """A new server of a service."""
-        qos = self.settled(qos, "services_default", service.name)
-        writer_gid, reader_gid = self.gids(key, WRITER_KIND, READER_KIND)
-        replier = LocalReplier(self, service, qos, writer_gid, reader_gid, on_request, on_data)
-        self._add(replier, replier.writer, replier.reader)
-        return replier
 
     def close(self) -> None:
         """Leave the space with everything made here, in one go."""
@@ -124,7 +69,8 @@ class LocalParticipant(EngineParticipant):
             record = self.home.topics[name] = TopicRecord(name)
         return record
 
-    def _add(self, child: Child, *endpoints: EngineEndpoint) -> None:
+    def open_child(self, child: Child, gids: list[bytes], *endpoints: LocalWriter | LocalReader) -> None:
+        """Join the topics of a new child."""
         self._children.append(child)
         for endpoint in endpoints:
             self.home.endpoints[endpoint.gid] = endpoint
@@ -136,8 +82,7 @@ class LocalParticipant(EngineParticipant):
 
     def take_out(self, child: Child) -> None:
         """One of the children leaves the topics it is on."""
-        endpoints = (child,) if isinstance(child, EngineEndpoint) else (child.reader, child.writer)
-        for endpoint in endpoints:
+        for endpoint in self.parts(child):
             record = self.record(endpoint.topic)
             record.leave(endpoint)
             if record.empty:
