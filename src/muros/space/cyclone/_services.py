@@ -131,11 +131,15 @@ class CycloneReplier(EngineReplier):
         gid = sample.writer_gid
         ids = split_header(sample.data, sample.representation)
         if ids is None or gid[:2] == DEAF:
-            _cannot(self.writer, self.service.name, f"a request to {self.service.name} was not understood")
+            self.deaf_to("a request to {} was not understood")
             return None
         self._ids[gid], sample.sequence = ids
         sample.data = sample.data[HEADER_SIZE:]
         return sample
+
+    def deaf_to(self, what: str) -> None:
+        """Say what of the service `{}` cannot be read."""
+        _cannot(self.writer, self.service.name, what.format(self.service.name))
 
     def left(self, gid: bytes) -> None:
         """A client is gone."""
@@ -216,6 +220,12 @@ class _RequestReader(CycloneReader):
     def sample(self, sample: Sample) -> Sample | None:
         """A request."""
         return self._replier.asked(sample)
+
+    def connected(self, gid: bytes) -> None:
+        """A client is there. Said at once if it cannot be understood: its first request may come before the match."""
+        super().connected(gid)
+        if gid[:2] == DEAF:
+            self._replier.deaf_to("requests to {} from a client are not understood")
 
     def disconnected(self, gid: bytes) -> None:
         """A client is gone."""
