@@ -11,6 +11,7 @@ from collections.abc import Callable, Hashable
 from functools import partial
 from typing import Any, Protocol
 
+from muros.agent import _attempts
 from muros.agent._calls import Call, Calls
 from muros.agent._limits import Limits
 from muros.agent._messages import (
@@ -60,12 +61,7 @@ from muros.xrce.constants import (
 
 __all__ = ["AgentCore", "Outlet", "Port"]
 
-ATTEMPT_PROPERTY = "muros_id"
-"""A property that muros clients give each attempt to connect, so that a CREATE_CLIENT that the network repeats is
-recognised and does not begin the session again."""
 LIVELINESS_PROPERTY = "uxr_hl"
-_ATTEMPT_MEMORY = 10_000
-"""How long a finished attempt is remembered, in ms."""
 _TICK = 50
 """How exactly heartbeats keep their time, in ms."""
 _DEAD_TICK = 1_000
@@ -160,7 +156,7 @@ class AgentCore:
         self._fresh: dict[AgentSession, None] = {}
         self._watched: dict[AgentSession, None] = {}
         self._calls = Calls()
-        self._attempts: dict[tuple[bytes, str], int] = {}
+        self._attempts = _attempts.Attempts(limits.max_clients)
         self.joining = 0
         self._heartbeat_at = 0
         self._liveliness_at = 0
@@ -217,10 +213,7 @@ class AgentCore:
         self._probe(now)
         self._forget_silent(now)
         self._ready(now)
-        while self._attempts and (oldest := next(iter(self._attempts.items())))[1] <= now:
-            del self._attempts[oldest[0]]
-        due = self._calls.next()
-        waits = [] if due is None else [due]
+        waits = [due for due in (self._calls.next(), self._attempts.tick(now)) if due is not None]
         if awaited or self._fresh:
             waits.append(now + _TICK)
         elif self.unacknowledged:
@@ -229,8 +222,6 @@ class AgentCore:
             waits.append(self._liveliness_at)
         if self.limits.forget_silent is not None and self.clients:
             waits.append(self._silence_at)
-        if self._attempts:
-            waits.append(next(iter(self._attempts.values())))
         self._next = min(waits) if waits else None
         return self._next
 
@@ -335,20 +326,11 @@ class AgentCore:
         self.findings.forget(session.who)
         self.tell(ClientGone(session.number, session.head[0], reason))
 
-    def _remember(self, session: AgentSession) -> None:
-        """A CREATE_CLIENT of this attempt that comes late is known as a repetition; the oldest stand first."""
-        attempts = self._attempts
-        attempts.pop((session.key, session.attempt), None)
-        attempts[session.key, session.attempt] = self.now + _ATTEMPT_MEMORY
-        if len(attempts) > self.limits.max_clients:
-            del attempts[next(iter(attempts))]
-        self._wake(self.now + _ATTEMPT_MEMORY)
-
     def logout(self, session: AgentSession, ids: bytes) -> None:
         """The client says goodbye."""
         session.answer_control(status(ids, STATUS_OK))
         if session.attempt:
-            self._remember(session)
+            self._wake(self._attempts.remember(session.key, session.attempt, self.now))
         self.remove(session, "it said goodbye")
 
     def found_again(self, session: AgentSession) -> None:
@@ -453,7 +435,7 @@ class AgentCore:
             )
             self._answer_create(port, address, asked, result)
             return
-        attempt = asked.properties.get(ATTEMPT_PROPERTY, "")
+        attempt = asked.properties.get(_attempts.PROPERTY, "")
         if attempt and (asked.key, attempt) in self._attempts:
             return  # the network repeats what a client said before it left
         self._replace_neighbour(port, address, asked)
