@@ -1,25 +1,36 @@
 """Each module of the board floor repeats the wire constants it needs; every repetition agrees with the table.
 
-A repeated constant is ``_NAME = const(expression)`` where ``NAME`` stands in ``muros.xrce.constants``.
+A repeated constant is ``_NAME = const(expression)`` where ``NAME`` stands in ``constants`` of `muros.xrce`, or of
+`muros.rosserial` for the modules of that room.
 """
 
 import ast
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
+from muros.rosserial import constants as rosserial
 from muros.xrce import constants
 from tests.micropython.tree import board_files, board_path
 
 _FILES = board_files()
-_TABLE = {name: value for name, value in vars(constants).items() if type(value) is int and name.isupper()}
+
+
+def _numbers(module: ModuleType) -> dict[str, int]:
+    return {name: value for name, value in vars(module).items() if type(value) is int and name.isupper()}
+
+
+_TABLE = _numbers(constants)
+_ROSSERIAL = _numbers(rosserial)
 
 
 @pytest.mark.parametrize("path", _FILES, ids=[board_path(path) for path in _FILES])
 def test_repeated_constants_agree(path: Path) -> None:
+    table = _ROSSERIAL if path.parent.name == "rosserial" else _TABLE
     for name, value in repeated(path.read_text()).items():
-        if name in _TABLE:
-            assert value == _TABLE[name], f"{board_path(path)}: _{name} is {value:#x}, not {_TABLE[name]:#x}"
+        if name in table:
+            assert value == table[name], f"{board_path(path)}: _{name} is {value:#x}, not {table[name]:#x}"
 
 
 def test_constants_are_found_whatever_their_expression() -> None:
@@ -29,7 +40,8 @@ def test_constants_are_found_whatever_their_expression() -> None:
 
 def test_some_module_repeats_some_constant() -> None:
     found = {name for path in _FILES for name in repeated(path.read_text())}
-    assert found & set(_TABLE), "nothing to compare: are the names still those of the table?"
+    for table in (_TABLE, _ROSSERIAL):
+        assert found & set(table), "nothing to compare: are the names still those of the table?"
 
 
 def repeated(source: str) -> dict[str, int]:

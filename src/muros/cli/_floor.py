@@ -19,7 +19,9 @@ Tree = dict[str, bytes]
 Compile = Callable[[str, bytes, str | None], bytes]
 """``compile(path, source, march)`` gives the .mpy file of a source."""
 
-BOARD_FLOOR = ("compat.py", "exports.py", "cdr.py", "cdr_texts.py", "cdr_lists.py", "xrce", "client", "rclc")
+BOARD_FLOOR = (
+    "compat.py", "exports.py", "cdr.py", "cdr_texts.py", "cdr_lists.py", "cdr_rows.py", "xrce", "client", "rclc", "rosserial",
+)  # fmt: skip
 """The rooms below ``muros/`` that boards import."""
 
 HOST_ONLY = frozenset(
@@ -33,6 +35,7 @@ HOST_ONLY = frozenset(
         "muros/rclc/hosts.py",
         "muros/rclc/middleware.py",
         "muros/rclc/parameter_files.py",
+        "muros/rosserial/constants.py",
         "muros/xrce/_crc.py",
         "muros/xrce/_types.py",
         "muros/xrce/constants.py",
