@@ -44,15 +44,16 @@ client.hosts Session
 rclc.action_hosts ActionClient ActionServer
 rclc.hosts Client Context Executor GuardCondition Node Service Subscription
 rclc.parameter_files ParameterClient
+rclc.remapping ArgumentsError RosArguments remove_ros_arguments
 """
 
 
 def names(package: str) -> "list[str]":
     """All public names of a package that hosts have."""
     found = {"Qos"}
-    for line in _PLACES.strip().split("\n"):
+    for line in (_PLACES + _ON_HOSTS).strip().split("\n"):
         words = line.split()
-        if words[0].strip("*").split(".")[0] == package:
+        if words and words[0].strip("*").split(".")[0] == package:
             found.update(words[1:])
     return sorted(found - {"Uart"})
 

@@ -67,3 +67,11 @@ class Options(TypedDict, total=False):
     keepalive: int
     ping_timeout: int
     ping_attempts: int
+
+
+class SessionOptions(Options, total=False):
+    """All that a ``Session`` is told besides its transport and its key."""
+
+    session_id: int
+    mtu: int
+    history: int

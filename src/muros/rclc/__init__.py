@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from muros.rclc.parameter_files import ParameterClient as ParameterClient
     from muros.rclc.parameters import Parameter as Parameter
     from muros.rclc.parameters import Parameters as Parameters
+    from muros.rclc.remapping import ArgumentsError as ArgumentsError
+    from muros.rclc.remapping import RosArguments as RosArguments
+    from muros.rclc.remapping import remove_ros_arguments as remove_ros_arguments
     from muros.rclc.ros_time import RosTime as RosTime
     from muros.rclc.timer import Timer as Timer
     from muros.rclc.triggers import all_of as all_of

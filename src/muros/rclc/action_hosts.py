@@ -13,7 +13,7 @@ from muros.rclc import action_client as client_
 from muros.rclc import action_server as server_
 from muros.rclc import actions, goals
 from muros.rclc.errors import RclError
-from muros.rclc.hosts import WrongTypeError, WrongValueError, _be_callable, _fits, _no_class, _other
+from muros.rclc.host_checks import WrongTypeError, WrongValueError, be_callable, fits, no_class, other
 
 if TYPE_CHECKING:
     from muros.rclc.hosts import Node
@@ -26,14 +26,14 @@ class Goal(goals.Goal):
 
     def feedback(self, message: Any) -> bool:
         """Tells the client how it goes; whether that was taken. Raises GoalError when the goal has ended."""
-        if not _fits(message, self.server.kind.Feedback):
-            raise _other(message, self.server.kind.Feedback, "feedback")
+        if not fits(message, self.server.kind.Feedback):
+            raise other(message, self.server.kind.Feedback, "feedback")
         return super().feedback(message)
 
     def finish(self, event: int, result: Any) -> None:
         """Ends with a result."""
-        if result is not None and not _fits(result, self.server.kind.Result):
-            raise _other(result, self.server.kind.Result, "a goal")
+        if result is not None and not fits(result, self.server.kind.Result):
+            raise other(result, self.server.kind.Result, "a goal")
         super().finish(event, result)
 
 
@@ -66,15 +66,15 @@ class ActionClient(client_.ActionClient):
         result_timeout: float | None = None,
     ) -> client_.SentGoal | None:
         """Sends a goal; see ``muros.rclc.action_client.ActionClient.send_goal``. Raises TypeError for another type."""
-        if not _fits(goal, self.kind.Goal):
-            raise _other(goal, self.kind.Goal, "send_goal")
+        if not fits(goal, self.kind.Goal):
+            raise other(goal, self.kind.Goal, "send_goal")
         for callback, name in (
             (on_response, "on_response"),
             (on_feedback, "on_feedback"),
             (on_result, "on_result"),
         ):
             if callback is not None:
-                _be_callable(callback, name)
+                be_callable(callback, name)
         return super().send_goal(goal, on_response, on_feedback, on_result, timeout, result_timeout)
 
     def call(
@@ -84,8 +84,8 @@ class ActionClient(client_.ActionClient):
 
         Raises TypeError for another type, RclError when this very context serves the action.
         """
-        if not _fits(goal, self.kind.Goal):
-            raise _other(goal, self.kind.Goal, "call")
+        if not fits(goal, self.kind.Goal):
+            raise other(goal, self.kind.Goal, "call")
         if self.parts and self.parts[0].name in self.parts[0].context.services:
             raise RclError(
                 f"action {self.name!r} is served by this very context, which does not run during call(). "
@@ -107,7 +107,7 @@ def make_server(
     words = ("on_execute", "on_goal", "on_cancel", "on_accepted")
     for function, word in zip(functions, words, strict=True):
         if function is not None:
-            _be_callable(function, word)
+            be_callable(function, word)
     if functions[0] is None and functions[3] is None:
         raise WrongTypeError(
             "an action server needs on_execute, which is called with each goal, or on_accepted"
@@ -160,4 +160,4 @@ def _be_action(kind: Any) -> None:
         if hasattr(kind, "SendGoal") and hasattr(kind, "FeedbackMessage"):
             return
         raise WrongTypeError(f"{kind.TYPE} is no action such as example_interfaces/action/Fibonacci")
-    raise _no_class(kind, "an action class such as example_interfaces.action.Fibonacci")
+    raise no_class(kind, "an action class such as example_interfaces.action.Fibonacci")

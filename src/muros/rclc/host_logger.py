@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from muros.rclc import logger
+from muros.rclc.host_checks import WrongValueError
 
 if TYPE_CHECKING:
     from muros.rclc.hosts import Node
@@ -22,8 +23,6 @@ class Logger(logger.Logger):
     def log(self, level: int, text: str) -> bool:
         """Publishes a text of a level, and whatever else is given as its text. Raises ValueError for no level."""
         if not isinstance(level, int) or not 1 <= level <= 255:
-            from muros.rclc.hosts import WrongValueError
-
             raise WrongValueError(f"level is {level!r}: it must be a number from 10 (debug) to 50 (fatal)")
         return super().log(level, str(text))
 
@@ -44,8 +43,6 @@ def make(
     show: Callable[[str], object] | None,
 ) -> Logger:
     """A logger of a node. Raises ValueError for a level that there is not."""
-    from muros.rclc.hosts import WrongValueError
-
     number = LEVELS.get(level, 0) if isinstance(level, str) else level
     if not isinstance(number, int) or not 1 <= number <= 255:
         raise WrongValueError(f"level is {level!r}: it must be one of {', '.join(LEVELS)}")

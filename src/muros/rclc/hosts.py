@@ -6,8 +6,9 @@ Errors are TypeErrors and ValueErrors whose ``code`` is the return code of the C
 from __future__ import annotations
 
 import math
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -17,16 +18,34 @@ from muros.client.names import topic_name
 from muros.client.qos import profile
 from muros.rclc import client as client_
 from muros.rclc import context as context_
-from muros.rclc import contexts, handles, host_logger
+from muros.rclc import contexts, handles, host_logger, remapping
 from muros.rclc import executor as executor_
 from muros.rclc import guard as guard_
 from muros.rclc import node as node_
 from muros.rclc import service as service_
 from muros.rclc import subscription as subscription_
 from muros.rclc.errors import InvalidNameError, RclError
+from muros.rclc.host_checks import (
+    SERVICE_NAME_INVALID,
+    TOPIC_NAME_INVALID,
+    WrongTypeError,
+    WrongValueError,
+    be_callable,
+    be_message,
+    be_service,
+    be_text,
+    called,
+    fits,
+    invalid,
+    other,
+)
 from muros.rclc.middleware import _engines, open_url
+from muros.rclc.remapping import RosArguments
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
+    from muros.client._types import SessionOptions
     from muros.client.qos import Qos
     from muros.rclc._types import Publisher as AnyPublisher
     from muros.rclc.action_hosts import ActionClient, ActionServer
@@ -42,38 +61,29 @@ MALFORMED = 12
 
 Made = TypeVar("Made", "Client", "Service", "Subscription")
 
-_INVALID_ARGUMENT = 11
-_TOPIC_NAME_INVALID = 103
-_SERVICE_NAME_INVALID = 104
 _LARGEST_DOMAIN = 232
 _DEPTH = 1000
 """Messages that wait in a subscription that keeps all."""
 _LONGEST_NAME = 59  # characters of a topic in DDS: agents take no more
 
 
-class WrongTypeError(TypeError):
-    """Something of another kind was expected."""
-
-    code = _INVALID_ARGUMENT
-
-
-class WrongValueError(ValueError):
-    """A value that makes no sense."""
-
-    code = _INVALID_ARGUMENT
-
-
 class Context(context_.Context):
     """A way into the ROS graph: a transport to an agent, a session of your own making, a URL, or a data space.
 
-    ``Context(Udp("192.168.1.10"))``, ``Context(Session(Udp("192.168.1.10"), queue=8))`` go through an agent;
-    ``client_key`` is for a session that is made here, a random one if it is None. ``Context("dds:")`` is straight in
-    the ROS 2 graph, ``Context("local:")`` in a space of this process, ``Context(space)`` or ``Context(space=...)`` in
-    a space of your own making; further schemes may be registered with ``muros.rclc.register``. ``domain_id`` None is
-    0 through an agent, else the domain of the URL or the space.
+    ``Context(Udp("192.168.1.10"))`` goes through an agent, ``Context("dds:")`` straight into the ROS 2 graph,
+    ``Context("local:")`` into a space of this process, ``Context(space)`` or ``Context(space=...)`` into one of your
+    own; further schemes may be registered with ``muros.rclc.register``. ``domain_id`` None is 0 through an agent, else
+    the domain of the URL or the space.
+
+    ``client_key`` (a random one if it is None) and ``options`` are those of the ``Session`` that is made here:
+    ``Context(Udp("192.168.1.10"), queue=8, creation_timeout=500)``; one that you made, ``Context(Session(...))``, has
+    its own. ``args`` is a command line whose part behind ``--ros-args`` counts, None that of the program; what
+    remains of it is in ``arguments.others``.
 
     Raises TypeError and ValueError, RclError for a space that cannot be had.
     """
+
+    arguments: RosArguments
 
     def __init__(
         self,
@@ -82,7 +92,10 @@ class Context(context_.Context):
         domain_id: int | None = None,
         *,
         space: Any = None,
+        args: Sequence[str] | None = None,
+        **options: Unpack[SessionOptions],
     ) -> None:
+        self.arguments = RosArguments.parse(sys.argv[1:] if args is None else args)
         if domain_id is not None and not (isinstance(domain_id, int) and 0 <= domain_id <= _LARGEST_DOMAIN):
             raise WrongValueError(f"domain_id is {domain_id!r}: it must be from 0 to {_LARGEST_DOMAIN}")
         if space is not None:
@@ -94,9 +107,10 @@ class Context(context_.Context):
         ):
             raise WrongTypeError(f"Context needs a transport such as Udp('192.168.1.10', 8888), not {way!r}")
         if hasattr(way, "receive") and not hasattr(way, "participant"):
-            way = Session(way, client_key)
-        elif client_key is not None:
-            raise WrongTypeError("client_key belongs to the session: Context(Session(transport, client_key))")
+            way = Session(way, client_key, **options)
+        elif client_key is not None or options:
+            name = next(iter(options), "client_key")
+            raise WrongTypeError(f"{name} belongs to the session: Context(Session(transport, {name}=...))")
         if isinstance(way, str) and way.split(":")[0] in _engines:
             way = open_url(way, domain_id or 0)
         elif isinstance(way, str) or hasattr(way, "graph"):
@@ -105,9 +119,21 @@ class Context(context_.Context):
         super().__init__(way, None, domain_id or 0)
         self.services: dict[str, Service] = {}
 
-    def node(self, name: str, namespace: str = "") -> Node:
-        """A node. Raises InvalidNameError."""
-        return Node(self, name, namespace)
+    def node(
+        self,
+        name: str,
+        namespace: str = "",
+        *,
+        remap: Mapping[str, str] | Iterable[str] = (),
+        parameters: Mapping[str, Any] | None = None,
+        use_arguments: bool = True,
+    ) -> Node:
+        """A node. ``remap`` has rules of its own, ``{"chatter": "/talk", "__ns": "/lab"}`` or ``["chatter:=/talk"]``.
+
+        ``parameters`` are values for what the node declares, in place of the defaults. Both go before what the command
+        line says, which ``use_arguments`` False leaves out. Raises InvalidNameError, ArgumentsError for no rule.
+        """
+        return Node(self, name, namespace, remap, parameters, use_arguments)
 
     on_state = contexts.on_state
     on_problem = contexts.on_problem
@@ -116,32 +142,52 @@ class Context(context_.Context):
 
 
 class Node(context_.Node):
-    """A node of a context; see ``muros.rclc.context.Node``. Raises TypeError and ValueError for what cannot be made."""
+    """A node of a context; see ``muros.rclc.context.Node``. Raises TypeError and ValueError for what cannot be made.
+
+    ``rules`` are those by which its names are remapped, ``overrides`` the values for parameters that it may declare.
+    """
 
     context: Context
 
-    def __init__(self, context: Context, name: str, namespace: str) -> None:
-        _be_text(name, "the name of a node")
-        _be_text(namespace, "a namespace")
+    def __init__(
+        self,
+        context: Context,
+        name: str,
+        namespace: str,
+        remap: Mapping[str, str] | Iterable[str] = (),
+        parameters: Mapping[str, Any] | None = None,
+        use_arguments: bool = True,
+    ) -> None:
+        be_text(name, "the name of a node")
+        be_text(namespace, "a namespace")
+        arguments = context.arguments if use_arguments else RosArguments()
+        self.rules = (*remapping.rules_of(remap), *arguments.rules)
+        name, namespace = remapping.remap_node(name, namespace, self.rules)
         try:
             node_.begin(self, context, name, namespace)
         except InvalidNameError:
             raise
         except ValueError as error:
             raise InvalidNameError(f"node {error}") from None
+        self.overrides = {**arguments.parameters(self.full_name), **(parameters or {})}
+
+    @property
+    def full_name(self) -> str:
+        """Namespace and name: "/greenhouse/thermometer"."""
+        return f"{self.namespace.rstrip('/')}/{self.name}"
 
     def publisher(self, kind: Any, topic: str, qos: str | Qos = "default") -> Publisher:
         """A publisher: ``publish(message)`` returns whether the message was taken."""
-        _be_message(kind)
+        be_message(kind)
         return Publisher(node_.publisher(self, kind, topic, qos), kind)
 
     def subscription(
         self, kind: Any, topic: str, callback: Callable[[Any], object] | None, qos: str | Qos = "default"
     ) -> Subscription:
         """A subscription; an executor calls ``callback(message)``."""
-        _be_message(kind)
+        be_message(kind)
         if callback is not None:  # an executor may give one
-            _be_callable(callback, "the callback of a subscription")
+            be_callable(callback, "the callback of a subscription")
         name = self._topic(topic)
         made = Subscription(self.context, kind, callback, qos)
         made.topic = topic
@@ -154,15 +200,15 @@ class Node(context_.Node):
             raise WrongValueError(
                 f"the period of a timer is {period!r}: it must be a number of seconds, at least 0"
             )
-        _be_callable(callback, "the callback of a timer")
+        be_callable(callback, "the callback of a timer")
         return node_.timer(self, period, callback, autostart)
 
     def service(
         self, kind: Any, name: str, callback: Callable[[Any], Any], qos: str | Qos = "services"
     ) -> Service:
         """A server of a service; ``callback(request)`` returns the response, or None to answer later."""
-        _be_service(kind)
-        _be_callable(callback, "the callback of a service")
+        be_service(kind)
+        be_callable(callback, "the callback of a service")
         full = self._resolve(name)
         made = Service(self.context, kind, callback)
         made.name = full
@@ -173,7 +219,7 @@ class Node(context_.Node):
 
     def client(self, kind: Any, name: str, qos: str | Qos = "services") -> Client:
         """A client of a service."""
-        _be_service(kind)
+        be_service(kind)
         full = self._resolve(name)
         made = Client(self.context, kind)
         made.name = full
@@ -195,7 +241,7 @@ class Node(context_.Node):
         given = (on_configure, on_activate, on_deactivate, on_cleanup, on_shutdown, on_error, time)
         for callback in given:
             if callback is not None:
-                _be_callable(callback, "a callback of a lifecycle")
+                be_callable(callback, "a callback of a lifecycle")
         return node_.lifecycle(self, *given[:-1], services, time or host_logger.system_time)
 
     def parameters(
@@ -254,7 +300,7 @@ class Node(context_.Node):
         """
         for function in (time, show):
             if function is not None:
-                _be_callable(function, "time or show of a logger")
+                be_callable(function, "time or show of a logger")
         return host_logger.make(self, level, time, show)
 
     @property
@@ -278,16 +324,28 @@ class Node(context_.Node):
     def _topic(self, name: str) -> str:
         longest = getattr(self.context.middleware, "longest_name", _LONGEST_NAME)
         try:
-            return topic_name("rt", self._resolve(name), "", longest)
+            return topic_name("rt", self.resolve_topic(name), "", longest)
         except ValueError as error:
-            raise _invalid(error, _TOPIC_NAME_INVALID) from None
+            raise invalid(error, TOPIC_NAME_INVALID) from None
 
     def _resolve(self, name: str) -> str:
-        _be_text(name, "the name of a topic or service")
         try:
-            return node_._resolve(self, name)
+            return self.resolve_service(name)
         except ValueError as error:
-            raise _invalid(error, _SERVICE_NAME_INVALID) from None
+            raise invalid(error, SERVICE_NAME_INVALID) from None
+
+    def resolve_topic(self, name: str) -> str:
+        """The full name of a topic, remapped. Raises InvalidNameError."""
+        return self._full(name, "topic")
+
+    def resolve_service(self, name: str) -> str:
+        """The full name of a service, remapped. Raises InvalidNameError."""
+        return self._full(name, "service")
+
+    def _full(self, name: str, kind: str) -> str:
+        be_text(name, "the name of a topic or service")
+        full = node_._resolve(self, name)
+        return remapping.remap(full, kind, self.name, self.namespace, self.rules) if self.rules else full
 
 
 class Publisher:
@@ -299,8 +357,8 @@ class Publisher:
 
     def publish(self, message: Any) -> bool:
         """Sends a message; False when it was not taken. Raises TypeError for one of another type."""
-        if not isinstance(message, self._kind) and not _fits(message, self._kind):
-            raise _other(message, self._kind, "publish")
+        if not isinstance(message, self._kind) and not fits(message, self._kind):
+            raise other(message, self._kind, "publish")
         return self._writer.publish(message)
 
     def destroy(self) -> None:
@@ -371,10 +429,10 @@ class Service(service_.Service):
 
     def reply(self, identity: bytes, response: Any) -> None:
         """Answers a request. Raises TypeError for what is no response of this service."""
-        if not _fits(response, self._kind.Response):
+        if not fits(response, self._kind.Response):
             raise WrongTypeError(
                 f"service {self.name!r} was answered with {response!r}. Its callback returns "
-                f"{_called(self._kind)}.Response(...), or None to answer later."
+                f"{called(self._kind)}.Response(...), or None to answer later."
             )
         super().reply(identity, response)
 
@@ -397,9 +455,9 @@ class Client(client_.Client):
 
         False when the request was not taken. Raises TypeError for a request of another type.
         """
-        if not _fits(request, self._kind.Request):
-            raise _other(request, self._kind.Request, "send")
-        _be_callable(on_reply, "on_reply")
+        if not fits(request, self._kind.Request):
+            raise other(request, self._kind.Request, "send")
+        be_callable(on_reply, "on_reply")
         return super().send(request, on_reply, timeout)
 
     def call(self, request: Any, timeout: float = client_._TIMEOUT) -> Any:
@@ -452,7 +510,7 @@ class Executor(executor_.Executor):
                 f"handles is {handles!r}: it must be how many may be added, or 0 for any number"
             )
         if trigger is not None:
-            _be_callable(trigger, "trigger")
+            be_callable(trigger, "trigger")
         super().__init__(context, handles, trigger)
 
     def add(self, handle: Any, callback: Callable[..., object] | None = None) -> None:
@@ -465,7 +523,7 @@ class Executor(executor_.Executor):
                 f"an executor cannot run {handle!r}: add subscriptions, timers, services, clients, guard conditions"
             )
         if callback is not None:
-            _be_callable(callback, "the callback of a handle")
+            be_callable(callback, "the callback of a handle")
         handles.add(self, handle, callback)
 
     def spin(self) -> None:
@@ -483,61 +541,3 @@ class Executor(executor_.Executor):
             handles.spin_period(self, period)
         except KeyboardInterrupt:
             self.context.close()
-
-
-def _be_text(name: Any, what: str) -> None:
-    if not isinstance(name, str):
-        raise WrongTypeError(f"{what} is a str, not {name!r}")
-
-
-def _be_callable(callback: Any, what: str) -> None:
-    if not callable(callback):
-        raise WrongTypeError(f"{what} is a function, not {callback!r}")
-
-
-def _be_message(kind: Any) -> None:
-    if isinstance(kind, type) and hasattr(kind, "TYPE"):
-        if hasattr(kind, "write"):
-            return
-        raise WrongTypeError(f"{kind.TYPE} is no message: topics carry messages such as std_msgs/msg/Int32")
-    raise _no_class(kind, "a message class such as std_msgs.msg.Int32")
-
-
-def _be_service(kind: Any) -> None:
-    if isinstance(kind, type) and hasattr(kind, "TYPE"):
-        if hasattr(kind, "Request") and hasattr(kind, "Response"):
-            return
-        raise WrongTypeError(f"{kind.TYPE} is no service such as example_interfaces/srv/AddTwoInts")
-    raise _no_class(kind, "a service class such as example_interfaces.srv.AddTwoInts")
-
-
-def _no_class(kind: Any, wanted: str) -> WrongTypeError:
-    if hasattr(kind, "TYPE"):
-        return WrongTypeError(f"give {wanted}: the class {_called(type(kind))} itself, not an object of it")
-    return WrongTypeError(f"give {wanted}, not {kind!r}")
-
-
-def _fits(message: Any, kind: Any) -> bool:
-    """Whether a message is of a type, by whatever class, or a sample without type that is serialised already."""
-    if isinstance(message, type):
-        return False
-    if hasattr(message, "TYPE"):
-        return bool(message.TYPE == kind.TYPE)
-    return callable(getattr(message, "size", None))
-
-
-def _other(message: Any, kind: Any, verb: str) -> WrongTypeError:
-    got = message.TYPE if hasattr(message, "TYPE") else repr(message)
-    return WrongTypeError(f"{verb} takes {kind.TYPE} here, not {got}")
-
-
-def _called(kind: Any) -> str:
-    name: str = kind.__name__
-    return name
-
-
-def _invalid(error: ValueError, code: int) -> InvalidNameError:
-    """The same error as one about names, with a code of its own."""
-    made = InvalidNameError(str(error))
-    made.code = code
-    return made

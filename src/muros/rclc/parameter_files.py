@@ -21,7 +21,7 @@ from typing import Any
 from muros.rclc import parameter_client
 from muros.rclc.parameter_errors import InvalidParameterError
 
-__all__ = ["ParameterClient", "fitting", "kind", "read", "write"]
+__all__ = ["ParameterClient", "by_node", "fitting", "kind", "matches", "read", "write"]
 
 _KEY = "ros__parameters"
 _DOUBLE, _BYTES = 3, 5
@@ -67,6 +67,22 @@ class ParameterClient(parameter_client.ParameterClient):
 
 def read(text: str, node: str, wildcard: bool = True, file: str = "the file") -> dict[str, Any]:
     """The parameters that YAML has for a node. InvalidParameterError if there are none, or it is no such file."""
+    nodes = by_node(text, file)
+    found = [given for key, given in nodes if matches(key, node) and (wildcard or "*" not in key)]
+    if not found:
+        names = ", ".join(key for key, _ in nodes)
+        raise InvalidParameterError(f"{file} has no parameters for {node}, only for {names or 'nobody'}")
+    values: dict[str, Any] = {}
+    for given in found:
+        values.update(given)
+    return values
+
+
+def by_node(text: str, file: str = "the file") -> list[tuple[str, dict[str, Any]]]:
+    """The parameters that YAML has, node by node; those whose names have no wildcard come last.
+
+    InvalidParameterError for what is no such file.
+    """
     yaml = import_module("yaml")
     try:
         found = yaml.safe_load(text)
@@ -74,16 +90,22 @@ def read(text: str, node: str, wildcard: bool = True, file: str = "the file") ->
         raise InvalidParameterError(f"{file} is no YAML: {' '.join(str(error).split())}") from None
     if not isinstance(found, dict):
         raise InvalidParameterError(f"{file} is no file of parameters: it names no node")
-    nodes = _nodes(found, file)
-    keys = [key for key in nodes if _matches(key, node) and (wildcard or "*" not in key)]
-    if not keys:
-        raise InvalidParameterError(
-            f"{file} has no parameters for {node}, only for {', '.join(nodes) or 'nobody'}"
-        )
-    values: dict[str, Any] = {}
-    for key in sorted(keys, key=lambda key: "*" not in key):
-        _flatten("", nodes[key], values, file)
-    return values
+    nodes = []
+    for key, tree in _nodes(found, file).items():
+        values: dict[str, Any] = {}
+        _flatten("", tree, values, file)
+        nodes.append((key, values))
+    return sorted(nodes, key=lambda node: "*" not in node[0])
+
+
+def matches(key: str, node: str) -> bool:
+    """Whether a name with wildcards is that of a node."""
+    import re
+
+    parts = []
+    for part in key.strip("/").split("/"):
+        parts.append("(/[^/]+)*" if part == "**" else "/" + re.escape(part).replace(r"\*", "[^/]+"))
+    return re.fullmatch("".join(parts), node) is not None
 
 
 def write(node: str, values: Mapping[str, Any]) -> str:
@@ -123,16 +145,6 @@ def _nodes(tree: Mapping[Any, Any], file: str, path: str = "") -> dict[str, Mapp
         else:
             raise InvalidParameterError(f"{file}: {_KEY} of {name} has no names in it")
     return nodes
-
-
-def _matches(key: str, node: str) -> bool:
-    """Whether a name with wildcards is that of a node."""
-    import re
-
-    parts = []
-    for part in key.strip("/").split("/"):
-        parts.append("(/[^/]+)*" if part == "**" else "/" + re.escape(part).replace(r"\*", "[^/]+"))
-    return re.fullmatch("".join(parts), node) is not None
 
 
 def _flatten(path: str, tree: Mapping[Any, Any], values: dict[str, Any], file: str) -> None:
