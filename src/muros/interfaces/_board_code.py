@@ -1,15 +1,17 @@
 """Code of board classes: methods that MicroPython runs without touching the heap where that is possible.
 
 Compared with host classes the code is small rather than fast: no constants per format, one position variable, and
-helpers of ``muros.cdr``, ``cdr_texts`` and ``cdr_lists`` for whatever a second use pays for. What is written leaves
-the heap alone, and so does what is read of a message of fixed size without floats: its integers are read one by one,
-since unpacking would allocate a tuple. Other messages take heap when they are read anyway; runs are unpacked there.
+helpers of ``muros.cdr``, ``cdr_texts``, ``cdr_lists`` and ``cdr_rows`` for whatever a second use pays for. What is
+written leaves the heap alone, and so does what is read of a message of fixed size without floats: its integers are
+read one by one, since unpacking would allocate a tuple. Other messages take heap when they are read anyway; runs are
+unpacked there.
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from typing import TypeGuard, cast
 
 from muros.interfaces._encoder import Code, format_text
 from muros.interfaces._layout import (
@@ -36,6 +38,8 @@ Blank = Callable[[str, str], list[str]]
 """(full name of a message, variable) -> lines that put an instance without values into the variable."""
 
 _WORTH = 12  # leaves that a type must save, by being written out only once, before its code becomes functions
+RUN = 5
+"""Sequences in a row from which on one call for all of them is worth ``muros.cdr_rows``."""
 
 
 class Memo:
@@ -141,12 +145,21 @@ class _Walker:
         self._at = START
 
     def _walk(self, found: Sequence[Leaf]) -> None:
-        for leaf in found:
+        for run in _runs(found):
             start = self._at
-            self._leaf(leaf)
-            self._at = after(leaf, start)
+            if len(run) > 1:
+                self._sequences(cast("Sequence[Numbers | Many]", run))
+            else:
+                self._leaf(run[0])
+            for leaf in run:
+                start = after(leaf, start)
+            self._at = start
 
     def _leaf(self, leaf: Leaf) -> None:
+        raise NotImplementedError
+
+    def _sequences(self, run: Sequence[Numbers | Many]) -> None:
+        """Several sequences of numbers or strings that follow each other."""
         raise NotImplementedError
 
     def _flush(self) -> None:
@@ -236,6 +249,9 @@ class _Sizer(_Placed):
                 function = self._shared.function("size", leaf.type_name)
                 self._moved(f"{function}({self.code.place(leaf.path)}, {self._position()})")
 
+    def _sequences(self, run: Sequence[Numbers | Many]) -> None:
+        self._moved(f'sequences_size({self._position()}, "{_codes(run)}", {_places(self.code, run)})')
+
     def _many(self, leaf: Many) -> None:
         stride = None if leaf.count else _stride(leaf.body)
         if stride:
@@ -305,6 +321,9 @@ class _Writer(_Placed):
                 self._flush()
                 function = self._shared.function("write", leaf.type_name)
                 self._moved(f"{function}({value}, buf, {self._position()}, off)")
+
+    def _sequences(self, run: Sequence[Numbers | Many]) -> None:
+        self._call("put_sequences", f'"{_codes(run)}", {_places(self.code, run)}')
 
     def _call(self, function: str, arguments: str) -> None:
         """Calls a helper, which aligns by itself and returns the position behind what it wrote."""
@@ -454,6 +473,10 @@ class _Reader(_Runs):
             case _:
                 super()._leaf(leaf)
 
+    def _sequences(self, run: Sequence[Numbers | Many]) -> None:
+        self._flush()
+        self.code.line(f'{_places(self.code, run)} = sequences(at, "{_codes(run)}")')
+
     def _assign(self, path: Path, value: str) -> None:
         self._flush()
         self.code.line(f"{self.code.place(path)} = {value}")
@@ -495,6 +518,40 @@ class _Reader(_Runs):
         else:
             self.code.line(f"part(at, 1, {len(self._run)})")
             self._run = []
+
+
+def _runs(found: Sequence[Leaf]) -> Iterator[Sequence[Leaf]]:
+    """The leaves one by one, but ``RUN`` sequences in a row and more together."""
+    run: list[Leaf] = []
+    for leaf in found:
+        if _is_plain(leaf):
+            run.append(leaf)
+            continue
+        yield from _gathered(run)
+        run = []
+        yield (leaf,)
+    yield from _gathered(run)
+
+
+def _gathered(run: Sequence[Leaf]) -> Iterator[Sequence[Leaf]]:
+    if len(run) >= RUN:
+        yield run
+    else:
+        yield from ((leaf,) for leaf in run)
+
+
+def _is_plain(leaf: Leaf) -> TypeGuard[Numbers | Many]:
+    """Whether it is a sequence of numbers or strings without a bound."""
+    return (isinstance(leaf, Numbers) or (isinstance(leaf, Many) and _is_texts(leaf))) and not leaf.bound
+
+
+def _codes(run: Sequence[Numbers | Many]) -> str:
+    """The codes of several sequences; see ``muros.cdr_rows``."""
+    return "".join(leaf.code if isinstance(leaf, Numbers) else "s" for leaf in run)
+
+
+def _places(code: Code, run: Sequence[Numbers | Many]) -> str:
+    return ", ".join(code.place(leaf.path) for leaf in run)
 
 
 def _times(size: int, count: str) -> str:

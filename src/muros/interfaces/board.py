@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Sequence
 from pathlib import Path
 
 from muros.interfaces import _model as model
 from muros.interfaces._api import registry as default_registry
-from muros.interfaces._board_code import Memo, Shared, read_lines, size_lines, write_lines
+from muros.interfaces._board_code import RUN, Memo, Shared, read_lines, size_lines, write_lines
 from muros.interfaces._layout import Leaf, Many, Text, leaves
 from muros.interfaces._model import (
     PRIMITIVES,
@@ -41,6 +41,7 @@ _HELPERS = {
     "muros.cdr": ("Fields", "block", "ended", "integer", "need", "numbers"),
     "muros.cdr_texts": ("count", "finish", "pad", "part", "put_text", "text", "text_size", "unpack"),
     "muros.cdr_lists": ("list_size", "put_count", "put_sequence", "sequence", "texts_size"),
+    "muros.cdr_rows": ("new_sequences", "put_sequences", "sequences", "sequences_size"),
 }
 
 MOST_CONSTANTS = 500  # bytes of a 32-bit heap: names, each with what its entry takes
@@ -235,8 +236,13 @@ class _Work:
     def _init(self, message: Message, values: _Values, texts: int) -> list[str]:
         arguments, lines = ["self"], []
         hidden = _hidden(message)
+        runs = _runs(message.fields)
         for field in message.fields:
             name = attribute(field.name)
+            if (run := runs.get(field.name)) is not None:
+                arguments.append(f"{name}=None")
+                lines += run
+                continue
             if zeros := _zeros(field):
                 arguments.append(f"{name}=None")
                 lines.append(_unshadowed(f"self.{name} = numbers({name}, {zeros})", hidden))
@@ -343,6 +349,30 @@ def _imports(body: str) -> list[str]:
         if used:
             lines.append(f"from {module} import {', '.join(used)}")
     return lines
+
+
+def _runs(fields: Sequence[Field]) -> dict[str, list[str]]:
+    """The sequences that a constructor makes together: field -> lines, none but for the first in a row."""
+    made: dict[str, list[str]] = {}
+    row: list[Field] = []
+    for field in [*fields, None]:
+        if field is not None and _starts_empty(field):
+            row.append(field)
+            continue
+        if len(row) >= RUN:
+            names = [attribute(f.name) for f in row]
+            codes = "".join(PRIMITIVES[f.type.base].code or "s" for f in row)
+            targets = ", ".join(f"self.{name}" for name in names)
+            made |= {f.name: [] for f in row}
+            made[row[0].name] = [f'{targets} = new_sequences("{codes}", {", ".join(names)})']
+        row = []
+    return made
+
+
+def _starts_empty(field: Field) -> bool:
+    """Whether it is a sequence of primitives without a default."""
+    kinds = (Kind.SEQUENCE, Kind.BOUNDED)
+    return not field.type.nested and field.type.kind in kinds and field.default is None
 
 
 _GLOBALS = frozenset({"Fields", "array", "bytes", "float", "numbers", "range"})  # what constructors use
