@@ -43,6 +43,8 @@ _ON_HOSTS = """
 client.hosts Session
 rclc.action_hosts ActionClient ActionServer
 rclc.hosts Client Context Executor GuardCondition Node Service Subscription
+rclc.host_clock Clock
+rclc.host_parameters Parameters
 rclc.parameter_files ParameterClient
 rclc.remapping ArgumentsError RosArguments remove_ros_arguments
 """

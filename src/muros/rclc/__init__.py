@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from muros.rclc.errors import InvalidNameError as InvalidNameError
     from muros.rclc.errors import RclError as RclError
     from muros.rclc.goal_error import GoalError as GoalError
+    from muros.rclc.host_clock import Clock as Clock
+    from muros.rclc.host_parameters import Parameters as Parameters
     from muros.rclc.hosts import Client as Client
     from muros.rclc.hosts import Context as Context
     from muros.rclc.hosts import Executor as Executor
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
     from muros.rclc.parameter_errors import ParameterTypeError as ParameterTypeError
     from muros.rclc.parameter_files import ParameterClient as ParameterClient
     from muros.rclc.parameters import Parameter as Parameter
-    from muros.rclc.parameters import Parameters as Parameters
     from muros.rclc.remapping import ArgumentsError as ArgumentsError
     from muros.rclc.remapping import RosArguments as RosArguments
     from muros.rclc.remapping import remove_ros_arguments as remove_ros_arguments

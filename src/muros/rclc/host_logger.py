@@ -38,18 +38,76 @@ class Logger(logger.Logger):
 
 def make(
     node: Node,
-    level: int | str,
+    level: int | str | None,
     time: Callable[[], tuple[int, int]] | None,
     show: Callable[[str], object] | None,
+    services: bool,
 ) -> Logger:
     """A logger of a node. Raises ValueError for a level that there is not."""
+    arguments = node.context.arguments
+    name = logger.name_of(node)
+    if level is None:
+        level = arguments.level(name) or logger.INFO
     number = LEVELS.get(level, 0) if isinstance(level, str) else level
     if not isinstance(number, int) or not 1 <= number <= 255:
         raise WrongValueError(f"level is {level!r}: it must be one of {', '.join(LEVELS)}")
     kind = import_module("muros.interfaces").message("rcl_interfaces/msg/Log")
-    made = logger.begin(Logger, node, kind, number, time or system_time, show)
-    assert isinstance(made, Logger)
+    if not arguments.stdout and show is show_on_stderr:
+        show = None
+    publisher = node.publisher(kind, "/rosout", "rosout") if arguments.rosout else _Nowhere()
+    made = Logger(name, publisher, kind, number, time or system_time, show)
+    loggers = node.__dict__.setdefault("_loggers", [])
+    loggers.append(made)
+    if services and node.resolve_service("~/get_logger_levels") not in node.context.services:
+        LevelServices(node, loggers)
     return made
+
+
+class LevelServices:
+    """The two services by which others ask for the levels of a node's loggers, and set them."""
+
+    def __init__(self, node: Node, loggers: list[Logger]) -> None:
+        interfaces = import_module("muros.interfaces")
+        self._loggers = loggers
+        self._level = interfaces.message("rcl_interfaces/msg/LoggerLevel")
+        self._result = interfaces.message("rcl_interfaces/msg/SetLoggerLevelsResult")
+        self._get = interfaces.service("rcl_interfaces/srv/GetLoggerLevels")
+        self._set = interfaces.service("rcl_interfaces/srv/SetLoggerLevels")
+        node.service(self._get, "~/get_logger_levels", self.get, "parameters")
+        node.service(self._set, "~/set_logger_levels", self.set, "parameters")
+
+    def get(self, request: Any) -> Any:
+        """GetLoggerLevels: 0, unset, for a logger that is none of the node's."""
+        levels = {made.name: made.level for made in self._loggers}
+        answers = [self._level(name=name, level=levels.get(name, 0)) for name in request.names]
+        return self._get.Response(levels=answers)
+
+    def set(self, request: Any) -> Any:
+        """SetLoggerLevels: each by itself."""
+        return self._set.Response(results=[self._set_one(asked) for asked in request.levels])
+
+    def _set_one(self, asked: Any) -> Any:
+        found = [made for made in self._loggers if made.name == asked.name]
+        if not found:
+            names = ", ".join(sorted({made.name for made in self._loggers}))
+            return self._result(successful=False, reason=f"no logger {asked.name!r} here, only {names}")
+        level = asked.level or logger.INFO  # 0 unsets it
+        if not 1 <= level <= 255:
+            return self._result(successful=False, reason=f"there is no level {level}")
+        for made in found:
+            made.level = level
+        return self._result(successful=True, reason="")
+
+
+class _Nowhere:
+    """What a logger publishes to with ``--disable-rosout-logs``."""
+
+    def publish(self, message: Any, /) -> bool:
+        """Drops it."""
+        return True
+
+    def destroy(self) -> None:
+        """There is nothing."""
 
 
 def system_time() -> tuple[int, int]:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import sys
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -50,9 +49,10 @@ if TYPE_CHECKING:
     from muros.rclc._types import Publisher as AnyPublisher
     from muros.rclc.action_hosts import ActionClient, ActionServer
     from muros.rclc.goals import Goal
+    from muros.rclc.host_clock import Clock
+    from muros.rclc.host_parameters import Parameters
     from muros.rclc.lifecycle import Lifecycle
     from muros.rclc.logger import Logger
-    from muros.rclc.parameters import Parameters
     from muros.rclc.timer import Timer
     from muros.xrce._types import Buffer
 
@@ -258,10 +258,23 @@ class Node(context_.Node):
         """
         if self._resolve("~/get_parameters") in self.context.services:
             raise RclError(f"node {self.name!r} has parameters already: keep what parameters() gave")
-        from muros.rclc.parameter_files import kind
-        from muros.rclc.parameters import Parameters
+        from muros.rclc.host_parameters import Parameters
 
-        return Parameters(self, max, notify, undeclared, low_memory, longest, kind, time.time_ns)
+        made = self.__dict__["_parameters"] = Parameters(self, max, notify, undeclared, low_memory, longest)
+        if "_clock" in self.__dict__:
+            self.clock.follow(made)
+        return made
+
+    @property
+    def clock(self) -> Clock:
+        """The clock of the node, made when it is first used: the system's, or /clock's with ``use_sim_time``."""
+        made: Clock | None = self.__dict__.get("_clock")
+        if made is None:
+            from muros.rclc.host_clock import Clock
+
+            made = self.__dict__["_clock"] = Clock(self)
+            made.follow(self.__dict__.get("_parameters"))
+        return made
 
     def action_server(
         self,
@@ -290,18 +303,20 @@ class Node(context_.Node):
 
     def logger(
         self,
-        level: int | str = "info",
+        level: int | str | None = None,
         time: Callable[[], tuple[int, int]] | None = None,
         show: Callable[[str], object] | None = host_logger.show_on_stderr,
+        services: bool = False,
     ) -> Logger:
         """A logger to /rosout, see ``muros.rclc.node.logger``: ``level`` by name, and shown on standard error.
 
-        Raises ValueError for a level that there is not.
+        ``level`` None is what ``--log-level`` says, else "info". With ``services`` others may ask for the level and set
+        it: ``~/get_logger_levels``, ``~/set_logger_levels``. Raises ValueError for a level that there is not.
         """
         for function in (time, show):
             if function is not None:
                 be_callable(function, "time or show of a logger")
-        return host_logger.make(self, level, time, show)
+        return host_logger.make(self, level, time, show, services)
 
     @property
     def log(self) -> Logger:

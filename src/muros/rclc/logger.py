@@ -118,6 +118,11 @@ def begin(
     """Makes a logger of a node; ``made`` is its class, ``kind`` that of what it publishes, None the board's."""
     if kind is None:
         kind = __import__("rcl_interfaces.msg", None, None, ("Log",)).Log
+    return made(name_of(node), node.publisher(kind, "/rosout", "rosout"), kind, level, time, show)
+
+
+def name_of(node: "Any") -> str:
+    """What the logger of a node is called."""
     space = node.namespace[1:].replace("/", ".")
-    name = space + "." + node.name if space else node.name
-    return made(name, node.publisher(kind, "/rosout", "rosout"), kind, level, time, show)
+    name: str = space + "." + node.name if space else node.name
+    return name

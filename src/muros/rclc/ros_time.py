@@ -30,7 +30,7 @@ class RosTime:
 
     def __init__(self, node: "Node", kind: "Any" = None) -> None:
         if kind is None:
-            kind = _clock()
+            kind = clock_class()
         self.node = node
         self.known = False
         self.jumps = 0
@@ -104,7 +104,7 @@ class RosTimer(Timer):
         return 0 if self.ready(now) else _NEVER
 
 
-def _clock() -> "Any":
+def clock_class() -> "Any":
     """The class of what /clock says."""
     from muros.compat import MPY, borrow
 
