@@ -511,7 +511,117 @@ def test_a_writer_that_keeps_all_has_room_for_so_many_samples_of_an_instance() -
     assert [told.number for told in pair.left_events(Trouble)] == [2, 2]
     pair.run(SECOND)
     assert pair.write(9, instance=one) == 5
-    assert [told.problem for told in pair.left_events(Trouble)] == [Problem.INSTANCES_FULL] * 2
+    assert [told.problem for told in pair.left_events(Trouble)] == [Problem.INSTANCE_FULL] * 2
+    assert pair.writer.rejected == 2
+
+
+def test_a_writer_says_when_a_full_instance_has_room_again() -> None:
+    room = []
+    pair = Pair(keyed=True, history=History.KEEP_ALL, limits=ResourceLimits(max_samples_per_instance=2))
+    pair.writer.close(pair.now)
+    writer = pair.left.writer(
+        pair.talker, qos=pair.writer_qos, keyed=True, on_room=lambda: room.append(pair.now)
+    )
+    pair.run(SECOND)
+    one, two = b"1" * 16, b"2" * 16
+    assert [writer.write(payload(n), pair.now, instance=one) for n in range(3)] == [1, 2, 0]
+    assert writer.write(payload(3), pair.now, instance=two) == 3
+    assert room == []
+    pair.run(SECOND)
+    assert len(room) == 1
+    assert writer.write(payload(2), pair.now, instance=one) == 4
+
+
+def test_a_topic_without_a_key_is_one_instance() -> None:
+    limits = ResourceLimits(max_samples=10, max_samples_per_instance=3)
+    pair = Pair(history=History.KEEP_ALL, limits=limits)
+    assert [pair.write(number) for number in range(5)] == [1, 2, 3, 0, 0]
+    assert pair.writer.rejected == 2
+    pair.run(SECOND)
+    assert pair.write(5) == 4
+    assert [sample.payload for sample in pair.got] == [payload(number) for number in range(3)]
+
+
+def test_a_history_for_late_readers_gives_up_the_oldest_of_a_full_instance() -> None:
+    limits = ResourceLimits(max_samples=4, max_samples_per_instance=2)
+    pair = Pair(keyed=True, history=History.KEEP_ALL, durability=Durability.TRANSIENT_LOCAL, limits=limits)
+    one, two = b"1" * 16, b"2" * 16
+    for number, key in enumerate((one, two, two)):
+        assert pair.write(number, instance=key)
+    pair.run(SECOND)
+    assert pair.write(3, instance=two)
+    late = pair.right.reader(pair.right.participant(), qos=pair.reader_qos, keyed=True)
+    pair.run(SECOND)
+    assert [sample.payload for sample in pair.right.got[late.guid]] == [payload(n) for n in (0, 2, 3)]
+
+
+def test_a_writer_that_keeps_the_last_ones_refuses_instances_it_has_no_room_for() -> None:
+    limits = ResourceLimits(max_samples=3, max_samples_per_instance=2)
+    pair = Pair(keyed=True, depth=2, durability=Durability.TRANSIENT_LOCAL, limits=limits)
+    one, two = b"1" * 16, b"2" * 16
+    taken = [pair.write(number, instance=key) for number, key in enumerate((one, one, two, two, one))]
+    assert taken == [1, 2, 3, 0, 4]  # the last one takes the place of the first of its instance
+    assert pair.writer.rejected == 1
+    pair.writer.unregister(two, pair.now)
+    pair.run(SECOND)
+    assert pair.write(5, instance=b"3" * 16)
+
+
+@pytest.mark.parametrize(
+    ("depth", "limits", "words"),
+    [
+        (1, ResourceLimits(max_samples=3, max_samples_per_instance=4), "max_samples_per_instance is 4"),
+        (5, ResourceLimits(max_samples_per_instance=4), "the last 5 samples"),
+        (5, ResourceLimits(max_samples=4), "the last 5 samples"),
+    ],
+)
+def test_limits_that_contradict_themselves_are_an_error(
+    depth: int, limits: ResourceLimits, words: str
+) -> None:
+    pair = Pair()
+    for make in (
+        lambda qos: pair.left.writer(pair.talker, qos=qos),
+        lambda qos: pair.right.reader(pair.listener, qos=qos),
+    ):
+        with pytest.raises(ValueError, match=words):
+            make(replace(WRITER_QOS, depth=depth, limits=limits))
+        make(replace(WRITER_QOS, history=History.KEEP_ALL, limits=limits._replace(max_samples=9)))
+
+
+@pytest.mark.parametrize("keyed", [False, True])
+def test_what_a_reader_holds_back_is_limited_and_comes_later(keyed: bool) -> None:
+    """Nothing is lost: what is rejected is not acknowledged, and the writer sends it again when there is room."""
+    limits = ResourceLimits(max_samples=5, max_samples_per_instance=2)
+    pair = Pair(reader={"limits": limits}, history=History.KEEP_ALL, keyed=keyed)
+    pair.reader.close(pair.now)
+    got: list[bytes] = []
+    room = [1]
+
+    def on_sample(sample: Received) -> bool:
+        room[0] -= 1
+        if room[0] >= 0:
+            got.append(sample.payload)
+        return room[0] >= 0
+
+    reader = pair.right.reader(pair.listener, qos=pair.reader_qos, on_sample=on_sample, keyed=keyed)
+    pair.run(SECOND)
+    keys = [bytes([number]) * 16 if keyed else b"" for number in range(2)]
+    for number in range(20):
+        assert pair.write(number, instance=keys[number % 2])
+    pair.run(SECOND)
+    (proxy,) = reader.core.writers
+    assert (len(got), len(proxy.pending)) == (1, 4 if keyed else 2)
+    assert reader.rejected >= 15
+    told = {(told.local, told.remote, told.problem, told.number) for told in pair.right_events(Trouble)}
+    assert told == {(reader.guid, pair.writer.guid, Problem.INSTANCE_FULL, 2)}
+    before = reader.rejected
+    while len(got) < 20:
+        room[0] = 1
+        reader.resume(pair.now)
+        pair.run(SECOND)
+    assert got == [payload(number) for number in range(20)]
+    assert reader.rejected > before
+    assert pair.writer.acknowledged
 
 
 def test_a_reader_takes_so_many_instances() -> None:

@@ -576,6 +576,57 @@ class TestRefusing:
         assert bench.at_rest()
 
 
+class TestLimits:
+    def test_all_writers_share_the_room(self) -> None:
+        bench = Bench(limit=3)
+        bench.match(b"x" * 12)
+        bench.refuses = True
+        bench.data(1, 2)
+        bench.data(1, 2, writer=b"x" * 12)
+        bench.data(3)
+        assert bench.problems == [(Problem.SAMPLES_FULL, 3)] * 2
+        assert bench.core.rejected == 2
+        bench.refuses = False
+        bench.core.resume(bench.now)
+        assert bench.got == [1, 2, 1]
+
+    def test_what_comes_next_goes_before_what_came_early(self) -> None:
+        bench = Bench(limit=2)
+        bench.data(2, 3)
+        bench.refuses = True
+        bench.data(1)
+        assert bench.problems == [(Problem.SAMPLES_FULL, 2)]
+        bench.refuses = False
+        bench.core.resume(bench.now)
+        assert bench.got == [1, 2]
+        bench.wait(SECOND)
+        assert (3,) in {ack.missing for ack in bench.take(AckNack)}
+        bench.data(3)
+        assert bench.got == [1, 2, 3]
+        assert bench.at_rest()
+
+    def test_a_refused_sample_is_asked_for_again_when_others_have_all_the_room(self) -> None:
+        bench = Bench(limit=1)
+        bench.match(b"x" * 12)
+        bench.refuses = True
+        bench.data(1)
+        bench.data(1, writer=b"x" * 12)
+        bench.refuses = False
+        bench.core.resume(bench.now)
+        bench.sent.clear()
+        bench.wait(SECOND)
+        assert (1, (1,)) in {(ack.base, ack.missing) for ack in bench.take(AckNack)}
+
+    def test_nothing_is_asked_for_that_there_is_no_room_for(self) -> None:
+        bench = Bench(limit=2)
+        bench.refuses = True
+        bench.data(1, 2, 3, 4)
+        bench.beat(1, 4, final=False)
+        bench.wait(SECOND)
+        (ack,) = bench.take(AckNack)
+        assert (ack.base, ack.missing) == (1, ())
+
+
 _NUMBERS = st.one_of(st.integers(1, 40), st.integers(1, 2**63 - 1))
 _COUNTS = st.one_of(st.integers(0, 20), st.integers(0, 2**32 - 1))
 
@@ -605,9 +656,9 @@ def _events(draw: st.DrawFn) -> Event:
     return Gap(THEM, None, 0, WRITER, number, other, tuple(other + offset for offset in sorted(offsets)))
 
 
-@given(st.lists(_events(), max_size=60), st.booleans(), st.sampled_from([0, 3]))
-def test_no_writer_can_upset_a_reader(events: list[Event], reliable: bool, refusals: int) -> None:
-    bench = Bench(memory=3000, window=64, reliable=reliable)
+@given(st.lists(_events(), max_size=60), st.booleans(), st.sampled_from([0, 3]), st.sampled_from([0, 1, 5]))
+def test_no_writer_can_upset_a_reader(events: list[Event], reliable: bool, refusals: int, limit: int) -> None:
+    bench = Bench(memory=3000, window=64, reliable=reliable, limit=limit, limit_of_one=limit // 2)
     good = b"g" * 12
     bench.match(good)
     for at, event in enumerate(events):
@@ -619,6 +670,7 @@ def test_no_writer_can_upset_a_reader(events: list[Event], reliable: bool, refus
         proxy = bench.core.writers[0]
         assert proxy.held <= 3000 + 1400  # a refused sample may be as large as a datagram
         assert len(proxy.pending) + len(proxy.irrelevant) <= 64 + 64
+        assert len(proxy.pending) <= (limit or 64)
     bench.refuses = False
     bench.core.resume(bench.now)
     bench.wait(60 * SECOND)
@@ -626,6 +678,8 @@ def test_no_writer_can_upset_a_reader(events: list[Event], reliable: bool, refus
     assert bench.got == sorted(set(bench.got))
     bench.got.clear()
     bench.data(1, 3, 2, writer=good)
+    if reliable and limit:  # what has no room comes again
+        bench.data(*([1, 2, 3] * 3), writer=good)
     assert bench.got == ([1, 2, 3] if reliable else [1, 3])
     bench.core.unmatch_writer(guid_of(THEM, WRITER))
     assert bench.core.held == 0

@@ -54,9 +54,15 @@ class Problem(Enum):
     """Samples or fragments that came early were dropped, to be asked for again; the number: bytes."""
     INCOMPLETE = "samples-incomplete"
     """Fragments of best-effort samples whose rest never came were dropped; the number: samples."""
+    SAMPLES_FULL = "samples-full"
+    """A reader rejected a sample, to be asked for again, for as many wait already as its resource limits allow; the
+    number: the limit. The peer is the writer of the sample; so with the next two."""
+    INSTANCE_FULL = "instance-full"
+    """A sample was refused by the writer or rejected by the reader, for its instance has as many already as the
+    resource limits allow; the number: the limit."""
     INSTANCES_FULL = "instances-full"
-    """A sample was refused or dropped, for its instance is one too many, or has too many samples already (resource
-    limits); the number: the limit. The peer is the writer of the sample."""
+    """A sample was refused by the writer or dropped by the reader, for its instance is one too many; the number: the
+    limit."""
     INCONSISTENT = "fragments-inconsistent"
     """Fragments contradict each other or themselves; the number: submessages dropped."""
 

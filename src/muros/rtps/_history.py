@@ -6,6 +6,7 @@ all samples of a topic without a key) the last `depth` samples are kept, or all 
 lists: most are short, and there may be thousands.
 """
 
+from collections import Counter
 from collections.abc import Iterator
 
 from muros.rtps._endpoint import NEVER
@@ -54,14 +55,15 @@ class Sample:
 class History:
     """Samples by sequence number. `depth`: samples kept of each instance, None for all."""
 
-    __slots__ = ("_ending", "_first", "_instances", "_samples", "depth")
+    __slots__ = ("_counts", "_ending", "_first", "_instances", "_samples", "depth")
 
     def __init__(self, depth: int | None) -> None:
         if depth is not None and depth < 1:
             raise ValueError(f"history depth is {depth}; it must be at least 1, or None to keep all")
         self.depth = depth
         self._samples: dict[int, Sample] = {}
-        self._instances: dict[bytes, list[int]] = {}
+        self._instances: dict[bytes, list[int]] = {}  # with a depth, else ...
+        self._counts: Counter[bytes] = Counter()  # ... of instances that have a name
         self._ending: list[Sample] = []
         self._first = 1
 
@@ -99,15 +101,24 @@ class History:
             numbers.append(sample.sequence)
             if len(numbers) > self.depth:
                 self._samples.pop(numbers.pop(0), None)
+        elif sample.instance:
+            self._counts[sample.instance] += 1
         if sample.last:
             self._ending.append(sample)
 
     def count(self, instance: bytes) -> int:
         """Samples held of an instance."""
-        numbers = self._instances.get(instance)
-        if numbers is not None:
-            return len(numbers)
-        return sum(sample.instance == instance for sample in self._samples.values())
+        if self.depth is not None:
+            return len(self._instances.get(instance, ()))
+        if not instance:
+            return len(self._samples) - self._counts.total()
+        return self._counts[instance]
+
+    def drop_one(self, instance: bytes, to: int) -> None:
+        """Forget the oldest sample of an instance, if it is one of those up to the number `to`."""
+        oldest = next((sample for sample in self._samples.values() if sample.instance == instance), None)
+        if oldest is not None and oldest.sequence <= to:
+            self._remove(oldest)
 
     def drop_to(self, sequence: int) -> None:
         """Forget all samples up to and including `sequence`."""
@@ -141,6 +152,10 @@ class History:
             numbers.remove(sample.sequence)  # the oldest of its instance: found at once
             if not numbers:
                 del self._instances[sample.instance]
+        elif sample.instance:
+            self._counts[sample.instance] -= 1
+            if not self._counts[sample.instance]:
+                del self._counts[sample.instance]
 
     def _end(self, end: Sample) -> None:
         """Forget what is held of an instance up to its end."""

@@ -13,7 +13,7 @@ from muros.rtps._endpoint import Problem
 from muros.rtps._events import Data
 from muros.rtps._liveliness import OwnLease
 from muros.rtps._news import DeadlineMissed, LivelinessLost, Mismatch, Trouble
-from muros.rtps._parameters import InvalidParameters, Parameters, key_hash, status_info
+from muros.rtps._parameters import Parameters, key_hash_of, status_info_of
 from muros.rtps._parameters import inline_qos as build_inline_qos
 from muros.rtps._ports import ReaderPort, WriterPort
 from muros.rtps._qos import EndpointQos, History, Liveliness, Ownership, ResourceLimits
@@ -59,8 +59,8 @@ class LocalWriter(WriterPort):
     """A writer of ours. Made by `ParticipantCore.writer`."""
 
     __slots__ = (
-        "_deadlines", "_domain", "_instances", "_lease", "_most_of_one", "_on_room", "_watched", "closed", "data",
-        "guid", "owner", "refused", "remotes",
+        "_deadlines", "_domain", "_instances", "_lease", "_on_room", "_watched", "closed", "data",
+        "guid", "owner", "refused", "rejected", "remotes",
     )  # fmt: skip
 
     def __init__(
@@ -118,12 +118,9 @@ class LocalWriter(WriterPort):
                 now,
             )
         self._on_room = on_room
-        limits = qos.limits if keyed(self.entity) else None
-        self._instances = _instances(limits)
-        self._most_of_one = 0
-        """Samples that may be held of one instance; 0 = no limit."""
-        if limits is not None and qos.history == History.KEEP_ALL:
-            self._most_of_one = max(0, limits.max_samples_per_instance)
+        self.rejected = 0
+        """Samples it had no room for: `write` returned 0."""
+        self._instances = _instances(qos.limits if keyed(self.entity) else None)
         self._watched = self._deadlines is not None or qos.liveliness != Liveliness.AUTOMATIC
 
     @property
@@ -156,9 +153,9 @@ class LocalWriter(WriterPort):
         to: Guid | None = None,
         instance: bytes = b"",
     ) -> int:
-        """Write a sample (encapsulation included); its sequence number, or 0 when there is no room now (keep all):
-        `on_room` is called when writing is worth trying again. Also 0 when the resource limits have no room for one
-        more instance (until one is unregistered) or sample of it; `Trouble` tells.
+        """Write a sample (encapsulation included); its sequence number, or 0 when there is no room now, as it keeps all
+        or its resource limits say: `on_room` is called when writing is worth trying again. `Trouble` tells when the
+        sample's instance is the reason: one too many (until one is unregistered), or full.
 
         source_time: ns since 1970. inline_qos: a little-endian parameter list (`muros.rtps.inline_qos`).
         to: only this matched reader gets it (the others learn that it is not for them). instance: key hash of 16
@@ -169,7 +166,8 @@ class LocalWriter(WriterPort):
             raise ValueError("the writer is closed")
         domain = self._domain
         domain.now = now
-        if (self._instances is not None or self._most_of_one) and not self._has_room(instance):
+        if self._instances is not None and not self._instances.admits(instance):
+            self._reject(Problem.INSTANCES_FULL, self._instances.most)
             domain.finish()
             return 0
         if instance:
@@ -178,7 +176,9 @@ class LocalWriter(WriterPort):
         sequence = core.write(payload, now, source_time, inline_qos, instance=instance, to=to)
         if core.due < self.wake_at:
             domain.agenda.at(self, core.due)
-        if self._watched and sequence is not None:
+        if sequence is None:
+            self._refused(instance)
+        elif self._watched:
             self._written(instance, now)
         if (domain.inside or domain.news or domain.gathered) and not domain.busy:
             domain.settle()
@@ -264,15 +264,17 @@ class LocalWriter(WriterPort):
         self._domain.finish()
         return sequence or 0
 
-    def _has_room(self, instance: bytes) -> bool:
-        """Whether the resource limits allow a sample of the instance now; tell if not."""
-        limit = self._most_of_one
-        if not limit or self.core.held_of(instance) < limit:
-            if self._instances is None or self._instances.admits(instance):
-                return True
-            limit = self._instances.most
-        self.owner.tell(Trouble(self.guid, self.guid, Problem.INSTANCES_FULL, limit))
-        return False
+    def _refused(self, instance: bytes) -> None:
+        """The core has no room for a sample of this instance."""
+        limit = self.core.settings.limit_of_one
+        if limit and self.core.held_of(instance) >= limit:
+            self._reject(Problem.INSTANCE_FULL, limit)
+        else:
+            self.rejected += 1
+
+    def _reject(self, problem: Problem, limit: int) -> None:
+        self.rejected += 1
+        self.owner.tell(Trouble(self.guid, self.guid, problem, limit))
 
     def _written(self, instance: bytes, now: int) -> None:
         if self._deadlines is not None:
@@ -300,8 +302,8 @@ class LocalReader(ReaderPort):
     """A reader of ours. Made by `ParticipantCore.reader`."""
 
     __slots__ = (
-        "_deadlines", "_domain", "_instances", "_keyed", "_lifespans", "_on_sample", "_plain", "closed", "data",
-        "guid", "outranked", "owner", "owners", "refused", "remotes",
+        "_deadlines", "_domain", "_dropped", "_instances", "_keyed", "_lifespans", "_on_sample", "_plain", "closed",
+        "data", "guid", "outranked", "owner", "owners", "refused", "remotes",
     )  # fmt: skip
 
     def __init__(
@@ -344,12 +346,18 @@ class LocalReader(ReaderPort):
         if qos.deadline < INFINITE:
             self._deadlines = Deadlines(qos.deadline, domain.settings.instances, domain.agenda, self._missed)
         self._instances = _instances(qos.limits if self._keyed else None)
+        self._dropped = 0
         self._plain = not self._keyed and self.owners is None and self._deadlines is None
 
     @property
     def qos(self) -> EndpointQos:
         """As given when it was made."""
         return self.data.qos
+
+    @property
+    def rejected(self) -> int:
+        """Samples for which its resource limits had no room. Those of reliable writers come again."""
+        return self.core.rejected + self._dropped
 
     @property
     def matched(self) -> tuple[Guid, ...]:
@@ -433,6 +441,7 @@ class LocalReader(ReaderPort):
             if status:
                 self._instances.end(instance)
             elif not self._instances.admits(instance):
+                self._dropped += 1
                 self.owner.tell(Trouble(self.guid, writer, Problem.INSTANCES_FULL, self._instances.most))
                 return False
         if status & StatusInfo.UNREGISTERED and self.owners is not None:
@@ -452,19 +461,3 @@ class LocalReader(ReaderPort):
 
 def _instances(limits: ResourceLimits | None) -> Instances | None:
     return Instances(limits.max_instances) if limits is not None and limits.max_instances > 0 else None
-
-
-def status_info_of(inline_qos: Parameters | None) -> int:
-    """`status_info`, nothing where it is malformed."""
-    try:
-        return int(status_info(inline_qos))
-    except InvalidParameters:
-        return 0
-
-
-def key_hash_of(inline_qos: Parameters | None) -> bytes:
-    """`key_hash`, nothing where there is none or it is malformed."""
-    try:
-        return key_hash(inline_qos) or b""
-    except InvalidParameters:
-        return b""

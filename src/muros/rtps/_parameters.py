@@ -17,9 +17,11 @@ __all__ = [
     "Parameters",
     "inline_qos",
     "key_hash",
+    "key_hash_of",
     "parse_untrusted",
     "related_identity",
     "status_info",
+    "status_info_of",
 ]
 
 MAX_PARAMETERS: Final = 1024
@@ -301,7 +303,23 @@ def status_info(parameters: Parameters | None) -> StatusInfo:
     return StatusInfo(0 if value is None else value[3] & 7)
 
 
+def status_info_of(parameters: Parameters | None) -> int:
+    """`status_info`, nothing where it is malformed."""
+    try:
+        return int(status_info(parameters))
+    except InvalidParameters:
+        return 0
+
+
 def key_hash(parameters: Parameters | None) -> bytes | None:
     """The key hash of the instance, 16 bytes."""
     value = None if parameters is None else parameters.first(Pid.KEY_HASH, 16)
     return None if value is None else value[:16]
+
+
+def key_hash_of(parameters: Parameters | None) -> bytes:
+    """`key_hash`, nothing where there is none or it is malformed."""
+    try:
+        return key_hash(parameters) or b""
+    except InvalidParameters:
+        return b""

@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING, Final
 from muros.rtps import _matching
 from muros.rtps._announcer import Announcer, Welcome
 from muros.rtps._constants import EntityKind, Pid, is_builtin, is_reader, is_writer
+from muros.rtps._constants import keyed as is_keyed
 from muros.rtps._discovery import Discovery
 from muros.rtps._discovery_data import Assertion, EndpointData, ParticipantData
 from muros.rtps._endpoint import Problem, Report
+from muros.rtps._limits import check_limits, limited_reader, limited_writer
 from muros.rtps._liveliness import Assertions, WriterLease
 from muros.rtps._local import LocalReader, LocalWriter, OnSample
 from muros.rtps._news import (
@@ -155,11 +157,13 @@ class ParticipantCore:
         entity: its entity id, with the kind of a user's writer (0x..02 with a key, 0x..03 without); None = the next
         free one. keyed: whether the topic has a key, where `entity` does not say. last: the sequence number of the
         last sample that an earlier life of the same GUID wrote. on_room: called when a refused sample is worth
-        trying again. ValueError: the id is in use or no writer's, or the participant is closed.
+        trying again. ValueError: the id is in use or no writer's, the limits in `qos` make no sense, or the participant
+        is closed.
         """
         entity = self._entity(entity, EntityKind.WRITER_KEYED if keyed else EntityKind.WRITER)
         if not is_writer(entity):
             raise ValueError(f"entity id 0x{entity:08x} is not a writer's: its last octet must be 02 or 03")
+        check_limits(qos)
         data = EndpointData(
             guid=guid_of(self.prefix, entity),
             topic=topic,
@@ -172,7 +176,7 @@ class ParticipantCore:
             data,
             now=now,
             last=last,
-            settings=settings or self._writer_settings(qos),
+            settings=limited_writer(settings or self.home.settings.writer, qos, keyed=is_keyed(entity)),
             endpoint_qos=_inline_qos(topic, qos),
             on_room=on_room,
         )
@@ -199,6 +203,7 @@ class ParticipantCore:
         entity = self._entity(entity, EntityKind.READER_KEYED if keyed else EntityKind.READER)
         if not is_reader(entity):
             raise ValueError(f"entity id 0x{entity:08x} is not a reader's: its last octet must be 04 or 07")
+        check_limits(qos)
         data = EndpointData(
             guid=guid_of(self.prefix, entity),
             topic=topic,
@@ -208,7 +213,7 @@ class ParticipantCore:
             expects_inline_qos=expects_inline_qos,
         )
         made = self._readers[entity] = LocalReader(
-            self, data, on_sample, settings=settings or self.home.settings.reader
+            self, data, on_sample, settings=limited_reader(settings or self.home.settings.reader, qos)
         )
         self.home.now = now
         self._open(made, now)
@@ -564,13 +569,6 @@ class ParticipantCore:
             if entity not in self._writers and entity not in self._readers:
                 return entity
         raise ValueError("the participant has no entity id left")
-
-    def _writer_settings(self, qos: EndpointQos) -> WriterSettings:
-        """The domain's, with the resource limits of `qos`."""
-        settings = self.home.settings.writer
-        if qos.limits is not None and qos.limits.max_samples > 0:
-            settings = replace(settings, limit=qos.limits.max_samples)
-        return settings
 
 
 def _inline_qos(topic: str, qos: EndpointQos) -> bytes:

@@ -23,6 +23,7 @@ from typing import Final, Protocol
 
 from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, first_count, newer
 from muros.rtps._fragments import FRAGMENT_COST, Assembly, fragments_of
+from muros.rtps._parameters import key_hash_of
 from muros.rtps._settings import READER_DEFAULTS, ReaderSettings
 from muros.rtps._values import EntityId, Guid, GuidPrefix, split_guid
 from muros.rtps._wire import MAX_SET, Data, DataFrag, Gap, Heartbeat, HeartbeatFrag, acknack, nack_frag
@@ -60,8 +61,8 @@ class ReaderCore:
     """
 
     __slots__ = (
-        "_deliver", "_entity", "_proxies", "_report", "_send", "_timed", "arrived", "due", "guid", "reliable",
-        "settings",
+        "_deliver", "_entity", "_proxies", "_report", "_send", "_timed", "arrived", "due", "guid", "rejected",
+        "reliable", "settings",
     )  # fmt: skip
 
     def __init__(
@@ -83,6 +84,8 @@ class ReaderCore:
         self._report = report
         self._proxies: dict[tuple[GuidPrefix, EntityId], WriterProxy] = {}
         self._timed: dict[WriterProxy, None] = {}  # those that wait for a time
+        self.rejected = 0
+        """Samples for which the resource limits had no room. Reliable ones come again."""
         self.arrived = 0
         """When the sample came that is being delivered."""
         self.due = NEVER
@@ -159,8 +162,7 @@ class ReaderCore:
                 if proxy.pending or proxy.irrelevant:
                     self._advance(proxy)
             else:
-                self._hold(proxy, event, now)
-                proxy.paused = True
+                self._refused(proxy, event, now)
         else:
             self._take_early(proxy, event, now)
 
@@ -304,15 +306,51 @@ class ReaderCore:
         self._forget_assembly(proxy, number)
         if number <= proxy.asked_to:
             proxy.progress = True
-        self._hold(proxy, event, now)
-        if proxy.held > self.settings.memory:
-            self._make_room(proxy)
+        if self._has_room(proxy, event):
+            self._hold(proxy, event, now)
+            if proxy.held > self.settings.memory:
+                self._make_room(proxy)
         self._overtaken(proxy, number, now)
+
+    def _refused(self, proxy: WriterProxy, event: Data, now: int) -> None:
+        """The receiver has no room for the next sample: it waits, if need be instead of one that came early."""
+        if not self._has_room(proxy, event):
+            if not proxy.pending:
+                self._overtaken(
+                    proxy, event.sequence, now
+                )  # others' samples have all the room: it has to come again
+                return
+            self._drop(proxy, max(proxy.pending))
+        self._hold(proxy, event, now)
+        proxy.paused = True
+
+    def _has_room(self, proxy: WriterProxy, event: Data) -> bool:
+        """Whether the resource limits have room for one more sample that waits; count and tell if not."""
+        limit, limit_of_one = self.settings.limit, self.settings.limit_of_one
+        if not limit and not limit_of_one:
+            return True
+        waiting = [sample for each in self._proxies.values() for sample in each.pending.values()]
+        if limit and len(waiting) >= limit:
+            problem = Problem.SAMPLES_FULL
+        else:
+            instance = key_hash_of(event.inline_qos)
+            if not limit_of_one or sum(key_hash_of(w.inline_qos) == instance for w in waiting) < limit_of_one:
+                return True
+            problem, limit = Problem.INSTANCE_FULL, limit_of_one
+        self.rejected += 1
+        self._tell(problem, proxy, limit)
+        return False
 
     def _hold(self, proxy: WriterProxy, event: Data, now: int) -> None:
         proxy.pending[event.sequence] = event
         proxy.came[event.sequence] = now
         proxy.held += len(event.payload) + SAMPLE_COST
+
+    def _drop(self, proxy: WriterProxy, number: int) -> None:
+        """Let go of a sample that waits; it will be asked for again."""
+        sample = proxy.pending.pop(number)
+        del proxy.came[number]
+        proxy.held -= len(sample.payload) + SAMPLE_COST
 
     def _advance(self, proxy: WriterProxy) -> None:
         """Deliver what has become next, and pass over what will not come."""
@@ -365,10 +403,8 @@ class ReaderCore:
                 break
             before = proxy.held
             self._forget_assembly(proxy, number)
-            sample = proxy.pending.pop(number, None)
-            if sample is not None:
-                del proxy.came[number]
-                proxy.held -= len(sample.payload) + SAMPLE_COST
+            if number in proxy.pending:
+                self._drop(proxy, number)
             dropped += before - proxy.held
         if dropped:
             self._tell(Problem.MEMORY_FULL, proxy, dropped)
@@ -447,7 +483,9 @@ class ReaderCore:
         expected, pending, irrelevant, assemblies = (
             proxy.expected, proxy.pending, proxy.irrelevant, proxy.assemblies,
         )  # fmt: skip
-        end = min(proxy.last + 1, expected + min(MAX_SET, self.settings.window))
+        end = min(
+            proxy.last + 1, expected + min(MAX_SET, self.settings.window, self.settings.limit or MAX_SET)
+        )
         wanted = [n for n in range(expected, end) if n not in pending and n not in irrelevant]
         if not wanted and not proxy.owes:
             return

@@ -14,6 +14,11 @@ class WriterSettings:
 
     limit: int = 5000
     """Samples held while they wait for acknowledgement by a writer that keeps all (and for late readers)."""
+    limit_of_one: int = 0
+    """Of them, samples of one instance of a topic with a key; 0 = as many as of all."""
+    strict: bool = False
+    """Whether `limit` also holds for a writer that keeps the last samples of each instance: it then refuses those of
+    an instance for which no room is left."""
     fragment_size: int = 65000
     """Larger samples are sent in fragments of this size; small samples are sent again together up to it.
 
@@ -51,8 +56,10 @@ class WriterSettings:
         ):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
-        if self.fragment_size > 65000 or self.hold_off < 0:
-            raise ValueError("fragment_size must be at most 65000 bytes and hold_off not negative")
+        if self.fragment_size > 65000 or self.hold_off < 0 or self.limit_of_one < 0:
+            raise ValueError(
+                "fragment_size must be at most 65000 bytes, and hold_off and limit_of_one not negative"
+            )
 
 
 WRITER_DEFAULTS: Final = WriterSettings()
@@ -64,6 +71,11 @@ class ReaderSettings:
 
     window: int = 1024
     """Samples of one writer may come early by this many numbers."""
+    limit: int = 0
+    """Samples of all writers that wait, because they came early or were refused; 0 = as memory and window allow. What
+    comes beyond it is rejected, and asked for again."""
+    limit_of_one: int = 0
+    """Of them, samples of one instance, 0 = as many as of all."""
     memory: int = 64 << 20
     """Bytes held for one writer: samples that came early, and those being put together. No larger one can come."""
     response_delay: int = 0
@@ -86,8 +98,9 @@ class ReaderSettings:
         for name in ("window", "memory", "hold_off", "slowest", "hello_period", "hellos", "assembly_time"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
-        if self.response_delay < 0 or self.asks < 0:
-            raise ValueError("response_delay and asks must not be negative")
+        for name in ("response_delay", "asks", "limit", "limit_of_one"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must not be negative")
 
 
 READER_DEFAULTS: Final = ReaderSettings()

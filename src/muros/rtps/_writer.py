@@ -24,7 +24,8 @@ from typing import Final
 from muros.rtps._constants import ENTITYID_UNKNOWN
 from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, first_count, newer
 from muros.rtps._fragments import fragments_of
-from muros.rtps._history import History, Sample
+from muros.rtps._history import Sample
+from muros.rtps._keeping import Keeper
 from muros.rtps._reader_proxy import ReaderProxy
 from muros.rtps._repairs import Repairs
 from muros.rtps._sending import OVERHEAD, WINDOW_LEAST, Allowance, Window, data_of, fragment_of, skips_of
@@ -71,8 +72,8 @@ class WriterCore:
 
     __slots__ = (
         "_allowance", "_ask_at", "_ask_every", "_count", "_cursor", "_endpoint_qos", "_entity",
-        "_history", "_idle", "_lagging", "_leaving", "_lifespan", "_on_room", "_proxies", "_refused", "_refused_at",
-        "_reliable", "_repair_at", "_repairs", "_report", "_retains", "_routes", "_send", "_unasked", "_unsent",
+        "_history", "_idle", "_keeper", "_lagging", "_leaving", "_proxies",
+        "_reliable", "_repair_at", "_repairs", "_report", "_routes", "_send", "_unasked", "_unsent",
         "_window", "_with_qos", "due", "guid", "last", "reliable", "sent", "settings",
     )  # fmt: skip
 
@@ -101,16 +102,22 @@ class WriterCore:
         self._entity = split_guid(guid)[1]
         self._send = send
         self._report = report
-        self._on_room = on_room
-        self._history = History(depth)
-        self._retains = reliable and transient_local
-        self._lifespan = lifespan
         self._endpoint_qos = endpoint_qos
         self._with_qos = False
         self._proxies: dict[tuple[GuidPrefix, EntityId], ReaderProxy] = {}
         self._reliable = 0  # how many of them are reliable
         self._idle: dict[ReaderProxy, None] = {}  # those that have everything
         self._lagging: dict[ReaderProxy, None] = {}  # those that do not
+        self._keeper = Keeper(
+            depth,
+            self._lagging,
+            settings,
+            retains=reliable and transient_local,
+            lifespan=lifespan,
+            tell=self._tell,
+            on_room=on_room,
+        )
+        self._history = self._keeper.history
         self._routes: tuple[Place, ...] = ()  # every place where a reader listens, once
         self._unsent: list[int] = []  # samples waiting to leave
         self._leaving: Sample | None = None  # the first of them, when part of it has left:
@@ -131,8 +138,6 @@ class WriterCore:
         kept = settings.limit if depth is None else max(depth, ASK_LEAST * 4)
         self._ask_every = max(1, min(ASK_MOST, kept // 4))
         self._unasked = 0
-        self._refused = False
-        self._refused_at = 0
         self._repair_at = NEVER
         self.due = NEVER
         """When `tick` is needed next, `NEVER` = not before something else happens."""
@@ -159,7 +164,7 @@ class WriterCore:
     @property
     def acknowledged(self) -> int:
         """All reliable readers that are not set aside have everything up to this sequence number."""
-        return min((p.acked for p in self._lagging if not p.aside), default=self.sent)
+        return self._keeper.acknowledged(self.sent)
 
     def match(
         self,
@@ -187,8 +192,8 @@ class WriterCore:
                 self._send_heartbeat(proxy, final=False)
             return
         start = self.sent + 1
-        if self._retains and reliable and transient_local:
-            self._expire(now)
+        if self._keeper.retains and reliable and transient_local:
+            self._keeper.expire(now)
             start = self._lowest()
         proxy = self._proxies[key] = ReaderProxy(*key, tuple(places), self.reliable and reliable, start)
         proxy.inline_qos = expects_inline_qos
@@ -217,7 +222,7 @@ class WriterCore:
             self._leaving = None
             self._cursor = 0
             self.sent = self.last
-        self._release(now)
+        self._keeper.release(self.sent, now)
 
     def write(
         self,
@@ -254,18 +259,13 @@ class WriterCore:
             sample.to = split_guid(to)
             if sample.to not in self._proxies:
                 raise ValueError(f"reader {to.hex()} is not matched")
-        if self._reliable or self._retains or self._unsent or (self._routes and not whole):
-            if self._lifespan:
-                sample.expires = now + self._lifespan
-                self.due = min(self.due, sample.expires)
-                self._expire(now)
-            if self._is_full() and not self._make_room(now):
-                if not self._refused:
-                    self._refused = True
-                    self._refused_at = now
-                self.due = min(self.due, self._patience_ends())
+        keeper = self._keeper
+        if self._reliable or keeper.retains or self._unsent or (self._routes and not whole):
+            if not keeper.add(sample, self.sent, now):
+                self.due = min(self.due, keeper.patience_ends())
                 return None
-            self._history.add(sample)
+            if sample.expires < self.due:
+                self.due = sample.expires
         self.last = sequence
         if not self._routes:
             self.sent = sequence
@@ -275,7 +275,7 @@ class WriterCore:
         else:
             self._transmit(sample, now)
         if last and not self._lagging:
-            self._release(now)
+            self._keeper.release(self.sent, now)
         return sequence
 
     def on_acknack(self, event: AckNack, now: int) -> None:
@@ -310,7 +310,7 @@ class WriterCore:
             self._adapt()
             if self._unsent:
                 self._pump(now)
-            self._release(now)
+            self._keeper.release(self.sent, now)
 
     def _begin_anew(self, proxy: ReaderProxy, event: AckNack) -> None:
         """An old count counts where a reader has forgotten us, has met us again, and asks what there is."""
@@ -343,19 +343,15 @@ class WriterCore:
         """Do what is due at `now`; returns the new `deadline`."""
         self._pump(now)
         self._repair(now)
-        expires = self._expire(now) if self._lifespan else NEVER
+        expires = self._keeper.expire(now)
         due = [proxy for proxy in self._lagging if proxy.due <= now]
         if due:
             self._beat(due, now)
-        if self._refused and self._make_room(now):
-            self._tell_room()
+        self._keeper.retry(self.sent, now)
         self.due = min((proxy.due for proxy in self._lagging), default=NEVER)
-        self.due = min(self.due, expires)
+        self.due = min(self.due, expires, self._repair_at, self._keeper.patience_ends())
         if self._unsent:
             self.due = min(self.due, now + self.settings.pace)
-        self.due = min(self.due, self._repair_at)
-        if self._refused:
-            self.due = min(self.due, self._patience_ends())
         return self.deadline
 
     # --- Sending -----------------------------------------------------------------------------------------
@@ -414,7 +410,7 @@ class WriterCore:
             self._cursor = 0
             del unsent[0]
         if not self._lagging:
-            self._release(now)
+            self._keeper.release(self.sent, now)
 
     def _pump_fragments(self, sample: Sample, now: int) -> bool:
         """Send what has not been sent of a large sample; False when the allowance is used up before its end."""
@@ -587,64 +583,8 @@ class WriterCore:
         self._reliable = sum(proxy.reliable for proxy in proxies)
         self._with_qos = bool(self._endpoint_qos) and any(proxy.inline_qos for proxy in proxies)
 
-    # --- Keeping -----------------------------------------------------------------------------------------
-
     def _lowest(self) -> int:
-        """The first sample that can be had: one kept, or the next to be written."""
-        first = self._history.first()
-        return self.sent + 1 if first is None else min(first, self.sent + 1)
-
-    def _is_full(self) -> bool:
-        return self._history.depth is None and len(self._history) >= self.settings.limit
-
-    def _make_room(self, now: int) -> bool:
-        """Whether a writer that keeps all can keep one more, after forgetting what need not be kept."""
-        if not self._is_full():
-            return True
-        if not self._drop_acknowledged():
-            for proxy in self._lagging:
-                if self._refused and not proxy.aside and now >= self._tolerated(proxy):
-                    proxy.aside = True
-                    self._tell(Problem.READER_STALLED, proxy, self.sent - proxy.acked)
-            self._drop_acknowledged()
-        return not self._is_full()
-
-    def _drop_acknowledged(self) -> bool:
-        """Forget samples everybody has: all of them, or as many as are needed when they are kept for late readers."""
-        acknowledged = self.acknowledged
-        if self._retains:
-            first = self._history.first()
-            if first is not None and first <= acknowledged:
-                self._history.drop_to(first)
-        else:
-            self._history.drop_to(acknowledged)
-        return not self._is_full()
-
-    def _release(self, now: int) -> None:
-        """Readers have acknowledged or gone: forget what is no longer needed, and say that there is room."""
-        if self._retains:
-            self._history.end_to(self.acknowledged)
-        else:
-            self._history.drop_to(self.acknowledged)
-        if self._refused and self._make_room(now):
-            self._tell_room()
-
-    def _expire(self, now: int) -> int:
-        """Forget what has outlived its lifespan; when to look again."""
-        return self._history.expire(now) if self._lifespan else NEVER
-
-    def _patience_ends(self) -> int:
-        """When the next reader may be set aside."""
-        return min((self._tolerated(proxy) for proxy in self._lagging if not proxy.aside), default=NEVER)
-
-    def _tolerated(self, proxy: ReaderProxy) -> int:
-        """Until when a reader may hold the writer: it is given time from the first sample that was refused."""
-        return max(proxy.since, self._refused_at) + self.settings.patience
-
-    def _tell_room(self) -> None:
-        self._refused = False
-        if self._on_room is not None:
-            self._on_room()
+        return self._keeper.lowest(self.sent)
 
     def _tell(self, problem: Problem, proxy: ReaderProxy, number: int) -> None:
         if self._report is not None:
