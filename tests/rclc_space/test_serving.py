@@ -1,6 +1,7 @@
 """Who runs the spaces: one thread or several, inside an asyncio program, in forks, at the end of a program."""
 
 import asyncio
+import select
 import signal
 import subprocess
 import sys
@@ -87,6 +88,23 @@ def test_waiting_is_sleeping(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
         executor.spin_some(1.0)
     assert Counting.count < 20, "it does not look again and again"
     context.close()
+
+
+@pytest.mark.skipif(not _serving._EPOLL, reason="no epoll here")
+def test_short_waits_are_not_rounded_up_to_milliseconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[float] = []
+    original = select.select
+
+    def watched(read: Any, write: Any, failed: Any, seconds: float) -> Any:
+        asked.append(seconds)
+        return original(read, write, failed, seconds)
+
+    monkeypatch.setattr(select, "select", watched)
+    context = Context("local:")
+    while not asked:
+        context.middleware.wait(0.25)  # type: ignore[arg-type]
+    context.close()
+    assert 0 < asked[0] <= 0.00025
 
 
 def test_what_comes_from_another_thread_wakes_who_waits(url: str) -> None:

@@ -17,10 +17,12 @@ from __future__ import annotations
 
 import asyncio
 import os
+import select
 import selectors
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from contextvars import Context
 from typing import Any, Final, Protocol
 
@@ -28,8 +30,13 @@ from muros.rclc.errors import RclError
 
 __all__ = ["Server", "Waiter", "server"]
 
+PRECISE: Final = 0.2
+"""Seconds; shorter waits are kept to the microsecond."""
+
 JUST_NOW: Final = 50e-6
 """Seconds after which a loop that ran is looked at again by who does not wait: about what a message costs."""
+
+_EPOLL = selectors.DefaultSelector is getattr(selectors, "EpollSelector", None)
 
 
 class Waiter(Protocol):
@@ -195,11 +202,19 @@ class _Selector(selectors.DefaultSelector):
         owner.asleep = True
         owner.lock.release()
         try:
-            ready = super().select(left if timeout is None else min(left, timeout))
+            ready = self._sleep(left if timeout is None else min(left, timeout))
         finally:
             owner.lock.acquire()
             owner.asleep = False
         return [event for event in map(self._now, ready) if event is not None]
+
+    def _sleep(self, seconds: float) -> list[tuple[selectors.SelectorKey, int]]:
+        """What is ready within a time. Python's epoll rounds it up to whole ms, so that timers would be late."""
+        if _EPOLL and seconds < PRECISE:
+            with suppress(ValueError):  # a descriptor that select cannot watch
+                select.select((self.fileno(),), (), (), seconds)
+                return super().select(0)
+        return super().select(seconds)
 
     def _now(self, event: tuple[selectors.SelectorKey, int]) -> tuple[selectors.SelectorKey, int] | None:
         """An event as it is now that we have the lock again: others may have closed the socket meanwhile."""
