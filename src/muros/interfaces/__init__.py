@@ -55,6 +55,15 @@ from muros.interfaces._names import (
 )
 from muros.interfaces._parse import parse
 from muros.interfaces._registry import ENV_PATHS, Registry
+from muros.interfaces._ros1 import (
+    Converter,
+    ServiceConverter,
+    converter,
+    ros1_name,
+    ros2_message,
+    ros2_service,
+    service_converter,
+)
 from muros.interfaces._runtime import Message as MessageBase
 
 __all__ = [
@@ -63,6 +72,7 @@ __all__ = [
     "ActionType",
     "CdrError",
     "Constant",
+    "Converter",
     "Definition",
     "Field",
     "FieldType",
@@ -72,12 +82,14 @@ __all__ = [
     "MessageBase",
     "Registry",
     "Service",
+    "ServiceConverter",
     "ServiceType",
     "action",
     "add_path",
     "check_full_name",
     "check_namespace",
     "check_node_name",
+    "converter",
     "dds_reply_topic",
     "dds_request_topic",
     "dds_topic",
@@ -95,10 +107,14 @@ __all__ = [
     "parse",
     "registry",
     "rihs01",
+    "ros1_name",
+    "ros2_message",
+    "ros2_service",
     "ros_service",
     "ros_topic",
     "ros_type_name",
     "service",
+    "service_converter",
     "source",
     "split_type",
     "text",

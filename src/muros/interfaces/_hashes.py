@@ -56,6 +56,11 @@ def ros1_md5(registry: Registry, name: str) -> str:
     return md5(text.encode(), usedforsecurity=False).hexdigest()
 
 
+def ros1_message_md5(registry: Registry, message: Message) -> str:
+    """The md5 sum in ROS 1 of a message whose definition is at hand."""
+    return md5(_md5_text(registry, message).encode(), usedforsecurity=False).hexdigest()
+
+
 def full_text(registry: Registry, name: str) -> str:
     """The definition followed by those of all nested messages, divided as in bag files."""
     top = registry.definition(name)
