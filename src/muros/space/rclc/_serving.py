@@ -33,8 +33,8 @@ __all__ = ["Server", "Waiter", "server"]
 PRECISE: Final = 0.2
 """Seconds; shorter waits are kept to the microsecond."""
 
-JUST_NOW: Final = 50e-6
-"""Seconds after which a loop that ran is looked at again by who does not wait: about what a message costs."""
+JUST_NOW: Final = 200e-6
+"""Seconds after which a loop that ran is looked at again by who does not wait: what some ten messages cost."""
 
 _EPOLL = selectors.DefaultSelector is getattr(selectors, "EpollSelector", None)
 
