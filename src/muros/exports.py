@@ -35,6 +35,7 @@ rclc.parameter_errors ParameterError ParameterNotDeclaredError ParameterTypeErro
 rclc.parameters Parameter Parameters
 rclc.ros_time RosTime
 rclc.service Service
+rclc.streaming Streamer
 rclc.subscription Subscription
 rclc.timer Timer
 rclc.triggers all_of any_of one
@@ -42,7 +43,8 @@ rclc.triggers all_of any_of one
 _ON_HOSTS = """
 client.hosts Session
 rclc.action_hosts ActionClient ActionServer
-rclc.hosts Client Context Executor GuardCondition Node Service Subscription
+rclc.host_entities Client GuardCondition Service Subscription
+rclc.hosts Context Executor Node
 rclc.host_clock Clock
 rclc.host_parameters Parameters
 rclc.parameter_files ParameterClient

@@ -1,5 +1,6 @@
 """Arguments of ROS 2: rules for names, parameters, levels; what is no argument is said in one line."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +11,27 @@ from muros.rclc import ArgumentsError, Context, InvalidNameError, Node, RosArgum
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32
 
+OPEN: list[Context] = []
+
+
+@pytest.fixture(autouse=True)
+def _closed() -> Iterator[None]:
+    """Closes what a test has opened."""
+    yield
+    while OPEN:
+        OPEN.pop().close()
+
+
+def program(*args: str) -> Context:
+    """The context of a program with these arguments; it is never spun."""
+    made = Context("local:", args=args)
+    OPEN.append(made)
+    return made
+
 
 def node(rules: str = "", name: str = "arm", namespace: str = "/", **options: Any) -> Node:
-    """A node of a program with these arguments; its context is never spun."""
-    return Context("local:", args=["--ros-args", *rules.split()]).node(name, namespace, **options)
+    """A node of a program with these arguments."""
+    return program("--ros-args", *rules.split()).node(name, namespace, **options)
 
 
 @pytest.mark.parametrize(
@@ -41,7 +59,6 @@ def test_topics_are_remapped(rules: str, namespace: str, name: str, full: str) -
     assert made.resolve_topic(name) == full
     publisher: Any = made.publisher(Int32, name)
     assert publisher.name == "rt" + full
-    made.context.close()
 
 
 def test_services_are_remapped() -> None:
@@ -50,7 +67,6 @@ def test_services_are_remapped() -> None:
     assert made.resolve_topic("sub") == "/sub"
     assert made.service(AddTwoInts, "add", lambda request: None).name == "/sum"
     assert made.client(AddTwoInts, "add").name == "/sum"
-    made.context.close()
 
 
 @pytest.mark.parametrize(
@@ -67,17 +83,15 @@ def test_services_are_remapped() -> None:
 def test_nodes_are_remapped(rules: str, full: str) -> None:
     made = node(rules, namespace="lab")
     assert made.full_name == full
-    made.context.close()
 
 
 def test_rules_of_a_node_go_before_those_of_the_program() -> None:
-    context = Context("local:", args=["--ros-args", "-r", "a:=b", "-r", "__ns:=/lab"])
+    context = program("--ros-args", "-r", "a:=b", "-r", "__ns:=/lab")
     made = context.node("arm", remap={"a": "c", "__node": "leg"})
     assert (made.full_name, made.resolve_topic("a")) == ("/lab/leg", "/lab/c")
     assert context.node("arm", remap=["x:=y"]).resolve_topic("a") == "/lab/b"
     left = context.node("arm", remap=["x:=y"], use_arguments=False)
     assert (left.full_name, left.resolve_topic("a"), left.resolve_topic("x")) == ("/arm", "/a", "/y")
-    context.close()
 
 
 def test_a_rule_that_leads_nowhere_is_told_where_the_name_is_used() -> None:
@@ -87,18 +101,17 @@ def test_a_rule_that_leads_nowhere_is_told_where_the_name_is_used() -> None:
     assert made.resolve_topic("chatter") == "/arm"
     with pytest.raises(InvalidNameError):
         made.resolve_topic("no name")
-    made.context.close()
 
 
 def test_the_command_line_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
     line = ["program", "-v", "--ros-args", "-r", "__node:=leg", "--", "file"]
     monkeypatch.setattr("sys.argv", line)
     context = Context("local:")
+    OPEN.append(context)
     assert context.node("arm").name == "leg"
     assert context.arguments.others == ("-v", "file")
     assert remove_ros_arguments(line) == ["program", "-v", "file"]
-    assert Context("local:", args=[]).node("arm").name == "arm"
-    context.close()
+    assert program().node("arm").name == "arm"
 
 
 def test_parameters_of_a_node(tmp_path: Path) -> None:
@@ -158,7 +171,7 @@ def test_switches() -> None:
 )
 def test_what_is_no_argument(arguments: str, code: int, said: str) -> None:
     with pytest.raises(ArgumentsError) as caught:
-        Context("local:", args=["--ros-args", *arguments.split()])
+        program("--ros-args", *arguments.split())
     assert caught.value.code == code
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -174,4 +187,4 @@ def test_a_file_that_is_none(tmp_path: Path) -> None:
 
 def test_remap_is_no_text() -> None:
     with pytest.raises(ArgumentsError, match="it must be a dict or a list of rules"):
-        Context("local:", args=[]).node("arm", remap="a:=b")
+        program().node("arm", remap="a:=b")

@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from muros.rclc.errors import RclError as RclError
     from muros.rclc.goal_error import GoalError as GoalError
     from muros.rclc.host_clock import Clock as Clock
+    from muros.rclc.host_entities import Client as Client
+    from muros.rclc.host_entities import GuardCondition as GuardCondition
+    from muros.rclc.host_entities import Service as Service
+    from muros.rclc.host_entities import Subscription as Subscription
     from muros.rclc.host_parameters import Parameters as Parameters
-    from muros.rclc.hosts import Client as Client
     from muros.rclc.hosts import Context as Context
     from muros.rclc.hosts import Executor as Executor
-    from muros.rclc.hosts import GuardCondition as GuardCondition
     from muros.rclc.hosts import Node as Node
-    from muros.rclc.hosts import Service as Service
-    from muros.rclc.hosts import Subscription as Subscription
     from muros.rclc.illegal import TransitionError as TransitionError
     from muros.rclc.lifecycle import Lifecycle as Lifecycle
     from muros.rclc.lifecycle_client import LifecycleClient as LifecycleClient
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from muros.rclc.remapping import RosArguments as RosArguments
     from muros.rclc.remapping import remove_ros_arguments as remove_ros_arguments
     from muros.rclc.ros_time import RosTime as RosTime
+    from muros.rclc.streaming import Streamer as Streamer
     from muros.rclc.timer import Timer as Timer
     from muros.rclc.triggers import all_of as all_of
     from muros.rclc.triggers import any_of as any_of

@@ -11,18 +11,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from muros.client import reasons
 from muros.client.hosts import Session
 from muros.client.names import topic_name
-from muros.client.qos import profile
-from muros.rclc import client as client_
 from muros.rclc import context as context_
-from muros.rclc import contexts, handles, host_logger, remapping
-from muros.rclc import executor as executor_
-from muros.rclc import guard as guard_
+from muros.rclc import contexts, host_logger, remapping
 from muros.rclc import node as node_
-from muros.rclc import service as service_
-from muros.rclc import subscription as subscription_
 from muros.rclc.errors import InvalidNameError, RclError
 from muros.rclc.host_checks import (
     SERVICE_NAME_INVALID,
@@ -33,11 +26,10 @@ from muros.rclc.host_checks import (
     be_message,
     be_service,
     be_text,
-    called,
-    fits,
     invalid,
-    other,
 )
+from muros.rclc.host_entities import Client, Publisher, Service
+from muros.rclc.host_handles import Subscription, Timer, ticks
 from muros.rclc.middleware import _engines, open_url
 from muros.rclc.remapping import RosArguments
 
@@ -46,24 +38,16 @@ if TYPE_CHECKING:
 
     from muros.client._types import SessionOptions
     from muros.client.qos import Qos
-    from muros.rclc._types import Publisher as AnyPublisher
     from muros.rclc.action_hosts import ActionClient, ActionServer
     from muros.rclc.goals import Goal
     from muros.rclc.host_clock import Clock
     from muros.rclc.host_parameters import Parameters
     from muros.rclc.lifecycle import Lifecycle
     from muros.rclc.logger import Logger
-    from muros.rclc.timer import Timer
-    from muros.xrce._types import Buffer
-
-MALFORMED = 12
-"""The code with which a subscription tells ``on_problem`` of its first malformed sample."""
 
 Made = TypeVar("Made", "Client", "Service", "Subscription")
 
 _LARGEST_DOMAIN = 232
-_DEPTH = 1000
-"""Messages that wait in a subscription that keeps all."""
 _LONGEST_NAME = 59  # characters of a topic in DDS: agents take no more
 
 
@@ -117,6 +101,7 @@ class Context(context_.Context):
             way = import_module("muros.space.rclc").open_way(way, domain_id)
             domain_id = way.domain
         super().__init__(way, None, domain_id or 0)
+        self.clock = ticks
         self.services: dict[str, Service] = {}
 
     def node(
@@ -195,13 +180,15 @@ class Node(context_.Node):
         return self._join(made, lambda: reader(self.participant, name, kind.TYPE, qos, made.deliver))
 
     def timer(self, period: float, callback: Callable[[], object], autostart: bool = True) -> Timer:
-        """A timer; an executor calls ``callback()`` every ``period`` seconds, to the millisecond."""
+        """A timer; an executor calls ``callback()`` every ``period`` seconds."""
         if not isinstance(period, int | float) or not math.isfinite(period) or period < 0:
             raise WrongValueError(
                 f"the period of a timer is {period!r}: it must be a number of seconds, at least 0"
             )
         be_callable(callback, "the callback of a timer")
-        return node_.timer(self, period, callback, autostart)
+        made = Timer(self.context, period, callback, autostart)
+        self.entities.append(made)
+        return made
 
     def service(
         self, kind: Any, name: str, callback: Callable[[Any], Any], qos: str | Qos = "services"
@@ -361,198 +348,3 @@ class Node(context_.Node):
         be_text(name, "the name of a topic or service")
         full = node_._resolve(self, name)
         return remapping.remap(full, kind, self.name, self.namespace, self.rules) if self.rules else full
-
-
-class Publisher:
-    """Made by ``Node.publisher``. Everything but ``publish`` is that of the middleware's writer."""
-
-    def __init__(self, writer: AnyPublisher, kind: Any) -> None:
-        self._writer = writer
-        self._kind = kind
-
-    def publish(self, message: Any) -> bool:
-        """Sends a message; False when it was not taken. Raises TypeError for one of another type."""
-        if not isinstance(message, self._kind) and not fits(message, self._kind):
-            raise other(message, self._kind, "publish")
-        return self._writer.publish(message)
-
-    def destroy(self) -> None:
-        """Takes it away."""
-        self._writer.destroy()
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._writer, name)
-
-
-class Subscription(subscription_.Subscription):
-    """Made by ``Node.subscription``; its first malformed sample is a problem that is told."""
-
-    topic = ""
-
-    def __init__(
-        self, context: context_.Context, kind: Any, callback: Callable[[Any], object] | None, qos: str | Qos
-    ) -> None:
-        super().__init__(context, kind, callback)
-        self.depth = profile(qos).depth or _DEPTH
-        self._kind = kind
-        self._waiting: list[Any] = []
-
-    def take(self) -> Any:
-        """The oldest message that waits, or None."""
-        return self._waiting.pop(0) if self._waiting else None
-
-    def ready(self, now: int) -> bool:
-        """Whether a message waits."""
-        return len(self._waiting) > 0
-
-    def deliver(self, buf: Buffer, off: int, n: int) -> None:
-        """Takes a sample of the middleware."""
-        if len(self._waiting) >= self.depth:
-            if self.eager:
-                self.run(0)
-            else:
-                self._waiting.pop(0)
-                self.lost += 1
-        message = self._kind()
-        try:
-            message.read(buf, off, n)
-        except ValueError:
-            self.malformed += 1
-            self._tell(n)
-        else:
-            self._waiting.append(message)
-
-    def _tell(self, n: int) -> None:
-        """Tells of the first malformed sample."""
-        if self.malformed == 1:
-            said = (
-                f"a sample of {n} B on {self.topic!r} is no {self._kind.TYPE} and was dropped. "
-                "Does somebody publish another type there?"
-            )
-            tell = self.context.middleware.on_problem
-            if tell is None:
-                reasons.say(said)
-            else:
-                tell(MALFORMED, said)
-
-
-class Service(service_.Service):
-    """Made by ``Node.service``; see ``muros.rclc.service.Service``."""
-
-    name = ""
-    context: Context
-
-    def reply(self, identity: bytes, response: Any) -> None:
-        """Answers a request. Raises TypeError for what is no response of this service."""
-        if not fits(response, self._kind.Response):
-            raise WrongTypeError(
-                f"service {self.name!r} was answered with {response!r}. Its callback returns "
-                f"{called(self._kind)}.Response(...), or None to answer later."
-            )
-        super().reply(identity, response)
-
-    def destroy(self) -> None:
-        """Takes it away."""
-        self.context.services.pop(self.name, None)
-        handles.destroy(self)
-
-
-class Client(client_.Client):
-    """Made by ``Node.client``; see ``muros.rclc.client.Client``."""
-
-    name = ""
-    context: Context
-
-    def send(
-        self, request: Any, on_reply: Callable[[Any], object], timeout: float = client_._TIMEOUT
-    ) -> bool:
-        """Sends a request; an executor calls ``on_reply(response)``, with None after ``timeout`` seconds.
-
-        False when the request was not taken. Raises TypeError for a request of another type.
-        """
-        if not fits(request, self._kind.Request):
-            raise other(request, self._kind.Request, "send")
-        be_callable(on_reply, "on_reply")
-        return super().send(request, on_reply, timeout)
-
-    def call(self, request: Any, timeout: float = client_._TIMEOUT) -> Any:
-        """Sends a request and waits for its response; None when it does not come within ``timeout`` seconds.
-
-        Not for callbacks, nor for a service of the same context: those run in an executor, where ``send`` belongs.
-        Raises RclError for the latter.
-        """
-        if self.name in self.context.services:
-            raise RclError(
-                f"service {self.name!r} is served by this very context, which does not run during call(). "
-                "Use send(request, on_reply) and an executor."
-            )
-        return handles.call(self, request, timeout)
-
-
-class GuardCondition(guard_.GuardCondition):
-    """See ``muros.rclc.guard.GuardCondition``."""
-
-    context: Context
-
-    def trigger(self) -> None:
-        """Makes it ready, from any thread.
-
-        An executor that waits straight in a data space wakes at once; one that waits for an agent within the time
-        until it would look again by itself, at most ``keepalive``.
-        """
-        super().trigger()
-        wake = getattr(self.context.middleware, "wake", None)
-        if wake is not None:
-            wake()
-
-
-class Executor(executor_.Executor):
-    """Runs the handles of a context; see ``muros.rclc.executor.Executor``.
-
-    Ctrl-C ends ``spin`` and ``spin_period``: they take leave of the graph and return.
-    """
-
-    def __init__(
-        self,
-        context: context_.Context,
-        handles: int = 0,
-        trigger: Callable[[list[Any]], bool] | None = None,
-    ) -> None:
-        if not isinstance(context, context_.Context):
-            raise WrongTypeError(f"Executor needs a context, not {context!r}")
-        if not isinstance(handles, int) or handles < 0:
-            raise WrongValueError(
-                f"handles is {handles!r}: it must be how many may be added, or 0 for any number"
-            )
-        if trigger is not None:
-            be_callable(trigger, "trigger")
-        super().__init__(context, handles, trigger)
-
-    def add(self, handle: Any, callback: Callable[..., object] | None = None) -> None:
-        """Runs a handle from now on, behind those added before; with ``callback`` in place of its own.
-
-        Raises CapacityError when the executor is full.
-        """
-        if isinstance(handle, type) or not (hasattr(handle, "ready") and hasattr(handle, "run")):
-            raise WrongTypeError(
-                f"an executor cannot run {handle!r}: add subscriptions, timers, services, clients, guard conditions"
-            )
-        if callback is not None:
-            be_callable(callback, "the callback of a handle")
-        handles.add(self, handle, callback)
-
-    def spin(self) -> None:
-        """Runs until the context is closed or Ctrl-C is pressed."""
-        try:
-            super().spin()
-        except KeyboardInterrupt:
-            self.context.close()
-
-    def spin_period(self, period: float) -> None:
-        """Makes one pass each ``period`` seconds, until the context is closed or Ctrl-C is pressed."""
-        if not isinstance(period, int | float) or not 0 < period < math.inf:
-            raise WrongValueError(f"period is {period!r}: it must be a number of seconds above 0")
-        try:
-            handles.spin_period(self, period)
-        except KeyboardInterrupt:
-            self.context.close()

@@ -1,0 +1,114 @@
+"""What nodes on hosts make: publishers and both sides of services. They check what they are given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from muros.client.raw import Raw
+from muros.rclc import client as client_
+from muros.rclc import handles
+from muros.rclc import service as service_
+from muros.rclc.errors import RclError
+from muros.rclc.host_checks import WrongTypeError, be_callable, called, fits, other
+from muros.rclc.outlet import body, outlet
+
+if TYPE_CHECKING:
+    from muros.rclc._types import Publisher as AnyPublisher
+    from muros.rclc.hosts import Context
+
+
+
+class Publisher:
+    """Made by ``Node.publisher``. Everything but ``publish`` is that of the middleware's writer."""
+
+    def __init__(self, writer: AnyPublisher, kind: Any) -> None:
+        self._writer = writer
+        self._kind = kind
+
+    def publish(self, message: Any) -> bool:
+        """Sends a message; False when it was not taken. Raises TypeError for one of another type."""
+        if not isinstance(message, self._kind) and not fits(message, self._kind):
+            raise other(message, self._kind, "publish")
+        if outlet.task is not None:
+            return outlet.task.publish(self._writer, message)
+        return self._writer.publish(message)
+
+    def write_bytes(self, data: bytes) -> bool:
+        """Sends a sample that is serialised already; False when it was not taken."""
+        return self.publish(Raw(data))
+
+    def destroy(self) -> None:
+        """Takes it away."""
+        self._writer.destroy()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._writer, name)
+
+
+class Service(service_.Service):
+    """Made by ``Node.service``; see ``muros.rclc.service.Service``."""
+
+    name = ""
+    context: Context
+
+    def reply(self, identity: bytes, response: Any) -> None:
+        """Answers a request. Raises TypeError for what is no response of this service."""
+        if not fits(response, self._kind.Response):
+            raise WrongTypeError(
+                f"service {self.name!r} was answered with {response!r}. Its callback returns "
+                f"{called(self._kind)}.Response(...), or None to answer later."
+            )
+        if outlet.task is not None:
+            answer = Raw(body(response))
+            outlet.task.hold(self, lambda: service_.Service.reply(self, identity, answer))
+            return
+        super().reply(identity, response)
+
+    def destroy(self) -> None:
+        """Takes it away."""
+        self.context.services.pop(self.name, None)
+        handles.destroy(self)
+
+
+class Client(client_.Client):
+    """Made by ``Node.client``; see ``muros.rclc.client.Client``."""
+
+    name = ""
+    context: Context
+
+    def send(
+        self, request: Any, on_reply: Callable[[Any], object], timeout: float = client_._TIMEOUT
+    ) -> bool:
+        """Sends a request; an executor calls ``on_reply(response)``, with None after ``timeout`` seconds.
+
+        False when the request was not taken. Raises TypeError for a request of another type.
+        """
+        if not fits(request, self._kind.Request):
+            raise other(request, self._kind.Request, "send")
+        be_callable(on_reply, "on_reply")
+        if outlet.task is not None:
+            asked = Raw(body(request))
+            outlet.task.hold(self, lambda: self._ask(asked, on_reply, timeout))
+            return True
+        return super().send(request, on_reply, timeout)
+
+    def _ask(self, request: Raw, on_reply: Callable[[Any], object], timeout: float) -> bool:
+        """Sends a request that LET has held back; one that is not taken then has no answer."""
+        taken = super().send(request, on_reply, timeout)
+        if not taken:
+            self._waiting.append((on_reply, None))
+        return taken
+
+    def call(self, request: Any, timeout: float = client_._TIMEOUT) -> Any:
+        """Sends a request and waits for its response; None when it does not come within ``timeout`` seconds.
+
+        Not for callbacks, nor for a service of the same context: those run in an executor, where ``send`` belongs.
+        Raises RclError for the latter.
+        """
+        if self.name in self.context.services:
+            raise RclError(
+                f"service {self.name!r} is served by this very context, which does not run during call(). "
+                "Use send(request, on_reply) and an executor."
+            )
+        return handles.call(self, request, timeout)
