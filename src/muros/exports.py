@@ -25,6 +25,7 @@ rclc.context Context Node
 rclc.errors CapacityError InvalidNameError RclError
 rclc.executor Executor
 rclc.guard GuardCondition
+rclc.handle_error HandleError
 rclc.illegal TransitionError
 rclc.lifecycle Lifecycle
 rclc.lifecycle_client LifecycleClient
@@ -38,13 +39,17 @@ rclc.service Service
 rclc.streaming Streamer
 rclc.subscription Subscription
 rclc.timer Timer
-rclc.triggers all_of any_of one
+*rclc.semantics ALWAYS LET ON_NEW_DATA RCLCPP
+*rclc.overruns CANCEL_CURRENT CANCEL_NEXT CANCEL_WITHOUT_OUTPUT GO_ON LOW_PRIORITY
+rclc.triggers all_of always any_of one
 """
 _ON_HOSTS = """
 client.hosts Session
 rclc.action_hosts ActionClient ActionServer
-rclc.host_entities Client GuardCondition Service Subscription
-rclc.hosts Context Executor Node
+rclc.host_entities Client Service
+rclc.host_executor Executor
+rclc.host_handles GuardCondition Subscription Timer
+rclc.hosts Context Node
 rclc.host_clock Clock
 rclc.host_parameters Parameters
 rclc.parameter_files ParameterClient

@@ -9,7 +9,16 @@ import pytest
 from muros.client import CONNECTED, Qos
 from muros.client._types import Transport
 from muros.client.creating import variant
-from muros.rclc import CapacityError, Context, Executor, GuardCondition, InvalidNameError, Node, register
+from muros.rclc import (
+    CapacityError,
+    Context,
+    Executor,
+    GuardCondition,
+    HandleError,
+    InvalidNameError,
+    Node,
+    register,
+)
 from muros.rclc.timer import Timer
 from tests.client.world import World
 
@@ -302,8 +311,9 @@ def test_an_executor_has_room_for_what_it_was_made_for() -> None:  # X5, X6
     executor.remove(subscriptions[0])
     executor.add(subscriptions[2])
     assert executor.handles == subscriptions[1:]
-    with pytest.raises(ValueError, match="not in list"):
+    with pytest.raises(HandleError, match="is not in this executor") as absent:
         executor.remove(subscriptions[0])
+    assert absent.value.code == 1
 
 
 def test_what_one_executor_claims_another_leaves() -> None:

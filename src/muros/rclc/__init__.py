@@ -21,20 +21,27 @@ if TYPE_CHECKING:
     from muros.rclc.errors import InvalidNameError as InvalidNameError
     from muros.rclc.errors import RclError as RclError
     from muros.rclc.goal_error import GoalError as GoalError
+    from muros.rclc.handle_error import HandleError as HandleError
     from muros.rclc.host_clock import Clock as Clock
     from muros.rclc.host_entities import Client as Client
-    from muros.rclc.host_entities import GuardCondition as GuardCondition
     from muros.rclc.host_entities import Service as Service
-    from muros.rclc.host_entities import Subscription as Subscription
+    from muros.rclc.host_executor import Executor as Executor
+    from muros.rclc.host_handles import GuardCondition as GuardCondition
+    from muros.rclc.host_handles import Subscription as Subscription
+    from muros.rclc.host_handles import Timer as Timer
     from muros.rclc.host_parameters import Parameters as Parameters
     from muros.rclc.hosts import Context as Context
-    from muros.rclc.hosts import Executor as Executor
     from muros.rclc.hosts import Node as Node
     from muros.rclc.illegal import TransitionError as TransitionError
     from muros.rclc.lifecycle import Lifecycle as Lifecycle
     from muros.rclc.lifecycle_client import LifecycleClient as LifecycleClient
     from muros.rclc.logger import Logger as Logger
     from muros.rclc.middleware import register as register
+    from muros.rclc.overruns import CANCEL_CURRENT as CANCEL_CURRENT
+    from muros.rclc.overruns import CANCEL_NEXT as CANCEL_NEXT
+    from muros.rclc.overruns import CANCEL_WITHOUT_OUTPUT as CANCEL_WITHOUT_OUTPUT
+    from muros.rclc.overruns import GO_ON as GO_ON
+    from muros.rclc.overruns import LOW_PRIORITY as LOW_PRIORITY
     from muros.rclc.parameter_errors import ParameterError as ParameterError
     from muros.rclc.parameter_errors import ParameterNotDeclaredError as ParameterNotDeclaredError
     from muros.rclc.parameter_errors import ParameterRejectedError as ParameterRejectedError
@@ -45,9 +52,13 @@ if TYPE_CHECKING:
     from muros.rclc.remapping import RosArguments as RosArguments
     from muros.rclc.remapping import remove_ros_arguments as remove_ros_arguments
     from muros.rclc.ros_time import RosTime as RosTime
+    from muros.rclc.semantics import ALWAYS as ALWAYS
+    from muros.rclc.semantics import LET as LET
+    from muros.rclc.semantics import ON_NEW_DATA as ON_NEW_DATA
+    from muros.rclc.semantics import RCLCPP as RCLCPP
     from muros.rclc.streaming import Streamer as Streamer
-    from muros.rclc.timer import Timer as Timer
     from muros.rclc.triggers import all_of as all_of
+    from muros.rclc.triggers import always as always
     from muros.rclc.triggers import any_of as any_of
     from muros.rclc.triggers import one as one
 

@@ -2,7 +2,9 @@
 
 One pass looks at every handle in turn; what is ready gives one piece of work to its callback. Between passes the
 executor lets the middleware work and waits for whatever comes first: a message, a timer, or a deadline of the
-middleware. What programs ask of executors and handles now and then boards borrow, see ``handles``.
+middleware. What programs ask of executors and handles now and then boards borrow, see ``handles``; what only some
+executors do, logical execution time and callbacks without data, is in ``let`` and ``always``, which put a pass of their
+own in the place of ``work``. Hosts have more, see ``host_executor``.
 """
 
 from muros.compat import const, lend, ticks_add, ticks_diff
@@ -24,33 +26,48 @@ class Executor:
 
     Without ``add`` it runs everything of the context that no other executor has claimed, in the order of making.
     ``handles`` bounds how many may be added (0: any number). ``trigger(handles)``, if given, decides before each pass
-    whether anything is taken.
+    whether anything is taken. ``options`` are those of ``let``: ``semantics``, ``period`` and more.
     """
+
+    stopped = False
 
     def __init__(
         self,
         context: "Context",
         handles: int = 0,
         trigger: "Callable[[list[Any]], bool] | None" = None,
+        **options: "Any",
     ) -> None:
         self.context = context
         self.capacity = handles
         self.trigger = trigger
         self.handles: "list[Any]" = context.handles
+        if options:
+            from muros.rclc.let import begin
+
+            begin(self, options)
 
     if TYPE_CHECKING:
+        period: float  # ms
+        on_error: "Any"
+        let: "Any"
+        due: "Any"  # when the period ends
+
         add = handles.add
         remove = handles.remove
+        spin_one_period = handles.spin_one_period
         spin_period = handles.spin_period
+        stop = handles.stop
     else:
 
         def __getattr__(self, name):
             return lend(self, "muros.rclc.handles", name)
 
     def spin(self) -> None:
-        """Runs until the context is closed."""
-        while self.context.running:
+        """Runs until the context is closed or ``stop`` is called."""
+        while self.context.running and not self.stopped:
             self.round(_TIMEOUT)
+        self.stopped = False
 
     def spin_some(self, timeout: float = 0.0) -> bool:
         """Waits up to ``timeout`` seconds until something is ready and makes one pass; whether anything ran."""

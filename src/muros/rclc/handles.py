@@ -12,15 +12,32 @@ if TYPE_CHECKING:
     from muros.rclc.timer import Timer
 
 _TIMEOUT = const(10)  # seconds
+_ON_NEW_DATA = const(0)
+_ALWAYS = const(1)
 
 
-def add(self: "Executor", handle: "Any", callback: "Callable[..., object] | None" = None) -> None:
+def add(
+    self: "Executor",
+    handle: "Any",
+    callback: "Callable[..., object] | None" = None,
+    when: int = _ON_NEW_DATA,
+    let: float = 0,
+    messages: int = 0,
+) -> None:
     """Runs a handle from now on, behind those added before; with ``callback`` in place of its own.
 
-    Raises CapacityError when the executor is full.
+    ``when`` ALWAYS calls a subscription in each pass, with None when nothing has come. ``let``, in seconds, is how long
+    an executor with LET gives the callback (0: one period), ``messages`` how many one publisher may publish meanwhile
+    (0: as the executor says). Raises CapacityError when the executor is full, HandleError for what it cannot run.
     """
     if self.handles is self.context.handles:
         self.handles = []
+    if getattr(handle, "context", None) is not self.context:
+        raise _wrong("%r is no handle of this executor's context" % handle)
+    if handle in self.handles:
+        raise _wrong("%r was added already" % handle)
+    if when and not hasattr(handle, "take"):
+        raise _wrong("%r cannot run ALWAYS: only subscriptions can" % handle)
     if self.capacity and len(self.handles) >= self.capacity:
         from muros.rclc.errors import CapacityError
 
@@ -35,24 +52,79 @@ def add(self: "Executor", handle: "Any", callback: "Callable[..., object] | None
     handle.eager = self.trigger is None
     handle.handles = self.handles
     self.handles.append(handle)
+    own = getattr(self, "let", None)
+    if own is not None:
+        task = own.task(handle)
+        task.let = int(let * 1000 + 0.5)
+        task.always = when == _ALWAYS
+        task.messages = messages or own.messages
+    elif when:
+        _always(self, handle)
+
+
+def _always(self: "Any", handle: "Any") -> None:
+    if not hasattr(self, "always"):
+        from muros.rclc.always import begin
+
+        begin(self)
+    self.always.append(handle)
 
 
 def remove(self: "Executor", handle: "Any") -> None:
-    """Runs a handle no more; the others keep their order. ValueError when it is not here."""
+    """Runs a handle no more; the others keep their order. HandleError when it is not here."""
+    if handle not in self.handles:
+        from muros.rclc.handle_error import absent
+
+        raise absent(handle)
     self.handles.remove(handle)
 
 
-def spin_period(self: "Executor", period: float) -> None:
-    """Makes one pass each ``period`` seconds until the context is closed; late ones are caught up."""
-    due = self.context.clock()
-    while self.context.running:
-        due = ticks_add(due, int(period * 1000))
-        self.work(self.context.clock())
-        left = ticks_diff(due, self.context.clock())
-        while left > 0:
-            self.context.middleware.wait(left)
-            self.context.middleware.spin_once(self.context.clock())
-            left = ticks_diff(due, self.context.clock())
+def _wrong(text: str) -> Exception:
+    from muros.rclc.handle_error import HandleError
+
+    return HandleError(text)
+
+
+def spin_period(self: "Executor", period: float = 0) -> None:
+    """Makes one pass each ``period`` seconds until the context is closed or ``stop`` is called.
+
+    Late ones are caught up. The period may be that of the executor.
+    """
+    self.due = None
+    while self.context.running and not self.stopped:
+        spin_one_period(self, period)
+    self.stopped = False
+
+
+def spin_one_period(self: "Any", period: float = 0) -> None:
+    """Makes one pass and waits for the end of the period: the first begins now, each other where the last has ended."""
+    ms = int(period * 1000 + 0.5) if period else getattr(self, "period", 0)
+    if not ms:
+        raise ValueError("spin_period needs a period: spin_period(0.01), or Executor(context, period=0.01)")
+    let = getattr(self, "let", None)
+    start = getattr(self, "due", None)
+    if start is None:
+        start = self.context.clock()
+    self.due = ticks_add(start, ms)
+    middleware = self.context.middleware
+    if let is None:
+        getattr(self, "beat", self.work)(self.context.clock())
+    else:
+        middleware.spin_once(self.context.clock())
+        let.start(start)
+        let.execute()
+    left = ticks_diff(self.due, self.context.clock())
+    while left > 0 and self.context.running:
+        middleware.wait(left)
+        middleware.spin_once(self.context.clock())
+        left = ticks_diff(self.due, self.context.clock())
+    if let is not None:
+        let.finish()
+
+
+def stop(self: "Any") -> None:
+    """Ends ``spin`` and ``spin_period`` when the callback that runs, or the period, is over."""
+    self.stopped = True
 
 
 def destroy(self: "Handle") -> None:
@@ -97,3 +169,13 @@ def call(self: "Client", request: "Any", timeout: float = _TIMEOUT) -> "Any":
         else:
             middleware.wait(min(left, middleware.deadline(now)))
     return answers[0]
+
+
+def wait_for_service(self: "Client", timeout: float = _TIMEOUT) -> bool:
+    """Waits until somebody serves what is asked, at most ``timeout`` seconds; whether somebody does. Not for callbacks.
+
+    Through an agent that publishes the graph, as that of muros and that of micro-ROS do; see ``graph``.
+    """
+    from muros.rclc.graph import wait_for_service as wait
+
+    return wait(self, timeout)

@@ -20,6 +20,11 @@ def any_of(*handles: "Any") -> "Trigger":
     return lambda added: _ready(handles or added) > 0
 
 
+def always(handles: "list[Any]") -> bool:
+    """Nothing needs to be new: at a fixed rate, subscriptions that were added with ALWAYS are called in each pass."""
+    return True
+
+
 def one(handle: "Any") -> "Trigger":
     """This handle has something new."""
     return lambda added: _ready((handle,)) > 0

@@ -1,0 +1,235 @@
+"""Logical execution time on hosts: what a callback publishes, answers and asks is held back by its thread.
+
+See `let`. A callback that overruns may go on beside the others here (LOW_PRIORITY): then all callbacks run in a
+worker thread, one after the other, while the thread of the executor keeps the periods. At the end of a period a
+callback that has not ended is late: its worker goes on with low priority, and another one calls what comes behind it.
+The late one is not called again before it has ended; its outputs leave at the end of the period in which it does.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from muros.client.raw import Raw
+from muros.rclc.errors import CapacityError
+from muros.rclc.host_handles import describe, tell_problem
+from muros.rclc.let import OVERRUN, Let, Task
+from muros.rclc.outlet import body, outlet
+from muros.rclc.overruns import LOW_PRIORITY
+
+if TYPE_CHECKING:
+    from muros.rclc.host_executor import Executor
+
+
+class HostTask(Task):
+    """One handle of an executor with LET; see `muros.rclc.let.Task`. What its callback sends is held back here."""
+
+    done = True
+    """Whether its callback has ended."""
+
+    error: Exception | None = None
+    """What its callback has raised in a worker."""
+
+    finished = 0.0
+    """The tick at which its callback has ended."""
+
+    def publish(self, writer: Any, message: Any) -> bool:
+        """Takes a message as it is now. CapacityError when the publisher has published too many."""
+        sample = Raw(body(message))
+        self.hold(writer, lambda: writer.publish(sample))
+        return True
+
+    def hold(self, sender: Any, send: Callable[[], object]) -> None:
+        """Has `send` called at the end of the period."""
+        count = sum(other is sender for other, _ in self.outputs)
+        if count >= self.messages:
+            raise CapacityError(
+                f"{count} messages of {count} of {sender.name} wait for the end of the period. "
+                f"Give add() or the executor messages={count + 1}."
+            )
+        self.outputs.append((sender, send))
+
+
+class HostOutputs:
+    """What callbacks send, held back for each thread."""
+
+    def open(self, task: HostTask) -> None:
+        """From now on what this thread sends is held back."""
+        outlet.task = task
+
+    def close(self) -> None:
+        """No more."""
+        outlet.task = None
+
+    def flush(self, task: HostTask) -> None:
+        """Has everything leave that waits."""
+        for _, send in task.outputs:
+            if send() is False:
+                task.lost += 1
+
+
+class HostLet(Let):
+    """The periods of an executor of hosts."""
+
+    executor: Executor
+
+    def __init__(self, executor: Executor, period: float, overrun: int, messages: int) -> None:
+        super().__init__(executor, period, overrun, messages, HostOutputs())  # type: ignore[arg-type]
+        self._worker: _Worker | None = None
+        self._queue: list[HostTask] = []
+
+    def task(self, handle: Any) -> HostTask:
+        """The task of a handle, made at the first need."""
+        task = self._tasks.get(handle)
+        if task is None:
+            task = self._tasks[handle] = HostTask(handle, 0, self.messages)
+            handle.eager = False
+        assert isinstance(task, HostTask)
+        return task
+
+    def begin(self, start: float, period: float) -> None:
+        """Starts a period of so many ms at the tick `start`, and calls what is to be called, or has it called."""
+        self.period = period  # type: ignore[assignment]
+        self.start(start)  # type: ignore[arg-type]
+        if self.overrun != LOW_PRIORITY:
+            self.execute()
+            return
+        for task in self._released:
+            assert isinstance(task, HostTask)
+            task.state = "RUNNING"
+            task.result = "NO_ERROR"
+            task.done = False
+            self._queue.append(task)
+        self._released = []
+        self._hand_on()
+
+    def finish(self) -> None:
+        """Ends a period: what is due leaves, what is late goes on with low priority."""
+        if self.overrun == LOW_PRIORITY:
+            self._look()
+        super().finish()
+
+    def over(self, task: Task) -> bool:
+        """Whether the let of a task is over, and its callback has ended."""
+        return super().over(task) and (not isinstance(task, HostTask) or task.done)
+
+    def survives(self, task: Task, error: Exception) -> bool:
+        """Whether the executor goes on although a callback has raised."""
+        return self.executor.survives(task.handle, error)
+
+    def tell(self, task: Task, late: float) -> None:
+        """Tells of an overrun: `on_overrun` each time, `on_problem` the 1st, 2nd, 4th, 8th... time."""
+        executor = self.executor
+        if executor.on_overrun is not None:
+            executor.on_overrun(task, late / 1000)
+        if task.overruns & (task.overruns - 1) == 0:
+            tell_problem(
+                executor.context,
+                OVERRUN,
+                f"{describe(task.handle)}, ended {late:.3g} ms behind its let of {task.let or self.period:g} ms; "
+                f"{task.overruns} so far. Give it less to do, or more time: add(..., let=), Executor(..., period=).",
+            )
+
+    def close(self) -> None:
+        """Ends the worker; a callback that has not ended does so by itself."""
+        if self._worker is not None:
+            self._worker.end()
+            self._worker = None
+
+    # With LOW_PRIORITY
+
+    def _hand_on(self) -> None:
+        """Gives a worker what waits to be called."""
+        if self._queue:
+            if self._worker is None:
+                self._worker = _Worker(self)
+            for task in self._queue:
+                self._worker.tasks.put(task)
+            self._queue = []
+
+    def _look(self) -> None:
+        """At the end of a period: who has raised, who was late, who still is."""
+        for task in list(self._tasks.values()):
+            assert isinstance(task, HostTask)
+            if task.state != "RUNNING" or task.end > self._number:
+                continue
+            if task.done:
+                late = task.finished - self._deadline(task)
+                if late > 0 and task.result == "NO_ERROR":
+                    self.late(task, late)  # type: ignore[arg-type]
+                if task.error is not None:
+                    self._raised(task)
+            elif task.result == "NO_ERROR":
+                self.late(task, max(self.executor.context.clock() - self._deadline(task), 0))  # type: ignore[arg-type]
+        self._replace()
+
+    def _deadline(self, task: HostTask) -> float:
+        return task.released + (task.let or self.period)
+
+    def _raised(self, task: HostTask) -> None:
+        error, task.error = task.error, None
+        assert error is not None
+        task.result = "HANDLING_ERROR"
+        task.outputs.clear()
+        if not self.survives(task, error):
+            task.state = "INACTIVE"
+            raise error
+
+    def _replace(self) -> None:
+        """Has a worker that is late go on with low priority, and another one do what it has not begun."""
+        worker = self._worker
+        if worker is None or worker.current is None or worker.current.result != "OVERRUN":
+            return
+        self._worker = None
+        while True:
+            try:
+                task = worker.tasks.get_nowait()
+            except queue.Empty:
+                break
+            self._queue.append(task)  # type: ignore[arg-type]  # None is put by end() alone
+        worker.end()
+        worker.lower()
+        self._hand_on()
+
+
+class _Worker:
+    """A thread that runs tasks one after the other."""
+
+    def __init__(self, let: HostLet) -> None:
+        self.tasks: queue.SimpleQueue[HostTask | None] = queue.SimpleQueue()
+        self.current: HostTask | None = None
+        self._let = let
+        self._thread = threading.Thread(target=self._work, daemon=True, name="muros LET")
+        self._thread.start()
+
+    def end(self) -> None:
+        """It ends behind what it has been given."""
+        self.tasks.put(None)
+
+    def lower(self) -> None:
+        """From now on it runs when nobody else wants to, as far as the system has such a thing."""
+        number = self._thread.native_id
+        try:
+            os.sched_setscheduler(number or 0, os.SCHED_IDLE, os.sched_param(0))
+        except (AttributeError, OSError):
+            pass  # it goes on as quick as the others
+
+    def _work(self) -> None:
+        let = self._let
+        while (task := self.tasks.get()) is not None:
+            self.current = task
+            let.outputs.open(task)
+            try:
+                let.run(task)
+            except Exception as error:
+                task.error = error
+            finally:
+                let.outputs.close()
+                task.input = None
+                task.finished = let.executor.context.clock()
+                self.current = None
+                task.done = True
