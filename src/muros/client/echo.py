@@ -13,10 +13,22 @@ _INFO = const(6)
 _REQUEST = const(10)
 
 
-def ask(session: "Session", timeout: int, clock: "Callable[[], int]") -> bool:
+def question(session: "Session") -> None:
+    """Sends the question."""
+    watching, session._ping = session._ping, _REQUEST
+    session.ask()
+    session._ping = watching
+
+
+def ask(
+    session: "Session",
+    timeout: int,
+    clock: "Callable[[], int]",
+    send: "Callable[[Session], object]" = question,
+) -> bool:
     """Whether the agent answers within ``timeout`` ms of ``clock`` and knows the session, which goes on meanwhile.
 
-    A session that is not connected yet may become so and be asked then.
+    A session that is not connected yet may become so and be asked then, with ``send(session)``.
     """
     answered: "list[bool]" = []
 
@@ -32,9 +44,7 @@ def ask(session: "Session", timeout: int, clock: "Callable[[], int]") -> bool:
         while left > 0 and True not in answered:
             session.spin_once(clock())
             if not asked and session.up and not session.login:
-                watching, session._ping = session._ping, _REQUEST
-                session.ask()
-                session._ping = watching
+                send(session)
                 asked = True
             if True not in answered:
                 session.wait(min(left, session.deadline(clock())))

@@ -7,19 +7,26 @@ from __future__ import annotations
 
 import atexit
 import os
+import threading
 import weakref
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from muros.client import methods, reasons
+from muros.client import echo, making, methods, reasons
 from muros.client import session as board
 from muros.client.entities import steps
 from muros.client.link import CONNECTED
 from muros.client.problems import SESSION
+from muros.client.sharing import Endpoint, Replier, Requester, Turnstile
+from muros.compat import ticks_add, ticks_ms
 
 if TYPE_CHECKING:
     from typing import Unpack
 
-    from muros.client._types import Options, Transport
+    from muros.client._types import OnData, Options, Transport
+    from muros.client.qos import AnyQos
+    from muros.client.services import OnReply, OnRequest
     from muros.xrce._types import Buffer
 
 _INDICES = 4096
@@ -55,15 +62,9 @@ class Session(board.Session):
     Raises TypeError and ValueError for wrong arguments. Problems are printed on standard error unless ``on_problem``
     is set. What keeps us from the agent is told once for each cause, and again when the cause has changed or the
     session was connected meanwhile. A session that is connected when the program ends is closed.
-    """
 
-    participant = methods.participant
-    writer = methods.writer
-    reader = methods.reader
-    requester = methods.requester
-    replier = methods.replier
-    ping = methods.ping
-    close = methods.close
+    Any thread may use a session and what is made in it, see ``sharing``; ``lock`` is held while one does.
+    """
 
     def __init__(
         self,
@@ -75,6 +76,9 @@ class Session(board.Session):
         **options: Unpack[Options],
     ) -> None:
         _check(transport, client_key, session_id, mtu, history, dict(options))
+        self.lock = threading.RLock()
+        self._gate = Turnstile()
+        self._pinging = threading.RLock()  # one at a time: they would take each other's answers
         super().__init__(transport, client_key, session_id, mtu, history, **options)
         _remember(self)
 
@@ -83,6 +87,103 @@ class Session(board.Session):
         """The client key, 4 bytes."""
         key: bytes = self.notes["key"]
         return key
+
+    def participant(self, name: str, domain: int = 0) -> board.Entity:
+        """A DDS participant; see ``methods``."""
+        with self._making():
+            return _shared(methods.participant(self, name, domain))
+
+    def writer(self, node: board.Entity, topic: str, kind: str, qos: AnyQos = "default") -> board.Entity:
+        """A writer of ``topic``; see ``methods``."""
+        with self._making():
+            return _shared(methods.writer(self, node, topic, kind, qos))
+
+    def reader(
+        self,
+        node: board.Entity,
+        topic: str,
+        kind: str,
+        qos: AnyQos = "default",
+        on_data: OnData | None = None,
+    ) -> board.Entity:
+        """A reader of ``topic``; see ``methods``."""
+        with self._making():
+            return _shared(methods.reader(self, node, topic, kind, qos, on_data))
+
+    def requester(
+        self, node: board.Entity, name: str, kind: str, on_reply: OnReply, qos: AnyQos = "services"
+    ) -> Requester:
+        """A client of the service ``name``; see ``methods``."""
+        made = Requester(on_reply)
+        with self._making():
+            making.service(made, self, node, name, kind, made.KIND, qos)
+        return made
+
+    def replier(
+        self, node: board.Entity, name: str, kind: str, on_request: OnRequest, qos: AnyQos = "services"
+    ) -> Replier:
+        """A server of the service ``name``; see ``methods``."""
+        made = Replier(on_request)
+        with self._making():
+            making.service(made, self, node, name, kind, made.KIND, qos)
+        return made
+
+    def spin_once(self, now: int | None = None) -> int:
+        """Does what is due and takes what has come; from any thread. See ``muros.client.session.Session``."""
+        gate = self._gate
+        gate.look()
+        taken = 1
+        try:
+            with self.lock:
+                taken = super().spin_once(now)
+        finally:
+            if gate.several:
+                self._pass_on(taken)
+        return taken
+
+    def wait(self, timeout: int) -> None:
+        """Waits until something may have come or ``wake`` is called, at most ``timeout`` ms; any number of threads."""
+        self._gate.wait(self.transport if self.up else None, timeout)
+
+    def wake(self) -> None:
+        """Ends a wait, from any thread."""
+        self._gate.wake()
+
+    def hurry(self) -> None:
+        """Something was published: whoever waits may have to repeat it sooner than he meant to get up."""
+        if self._gate.leading and self.reliable.first != self.reliable.next:
+            self._gate.due(self.reliable.due)
+
+    def ping(self, timeout: int = 1000, clock: Callable[[], int] = ticks_ms) -> bool:
+        """Asks the agent, within the session: whether it answers within ``timeout`` ms and knows us."""
+
+        def send(session: board.Session) -> None:
+            with self.lock:
+                echo.question(session)
+
+        with self._pinging:
+            return echo.ask(self, timeout, clock, send)
+
+    def close(self) -> None:
+        """Takes leave of the agent, for at most one second, and closes the transport."""
+        self._gate.wake()
+        with self.lock:
+            methods.close(self)
+
+    @contextmanager
+    def _making(self) -> Iterator[None]:
+        """Something is made, which the agent is asked for in the next turn."""
+        with self.lock:
+            yield
+        if self._gate.leading:
+            self._gate.wake()
+
+    def _pass_on(self, taken: int) -> None:
+        """Something was taken, or is due by now: wakes the threads whom that may concern."""
+        if taken:
+            self._gate.wake()
+        elif self._gate.leading:
+            self._gate.due(ticks_add(self.now, self.deadline(self.now)))
 
     def problem(self, code: int, value: int = 0, what: object = "") -> None:
         """Tells ``on_problem``, or whoever reads standard error."""
@@ -116,6 +217,12 @@ class Session(board.Session):
         self.trouble = (cause if told else _SILENT, since)
         if not told:
             self.problem(reasons.SILENT, now - since)
+
+
+def _shared(made: board.Entity) -> board.Entity:
+    """An entity for any thread; what makes it serves boards too, and knows their class alone."""
+    made.__class__ = Endpoint
+    return made
 
 
 def _check(
