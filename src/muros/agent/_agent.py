@@ -142,6 +142,7 @@ class Agent:
         self._stop()
         for session in list(self.core.clients.values()):
             self.core.remove(session, "the agent stops")
+        self.core.graph.close()
         self.findings.flush()
         if self._owns_space:
             self.space.close()

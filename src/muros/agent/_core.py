@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from muros.agent import _attempts
 from muros.agent._calls import Call, Calls
+from muros.agent._graph_topic import GraphTopic
 from muros.agent._limits import Limits
 from muros.agent._messages import (
     CreateClient,
@@ -158,6 +159,7 @@ class AgentCore:
         self._calls = Calls()
         self._attempts = _attempts.Attempts(limits.max_clients)
         self.joining = 0
+        self.graph = GraphTopic(self)
         self._heartbeat_at = 0
         self._liveliness_at = 0
         self._silence_at = 0

@@ -393,6 +393,7 @@ class AgentSession(SessionCore):
             )
         )
         self.core.has_created(self)
+        self.core.graph.made(proxy)
         if isinstance(proxy, ParticipantProxy):
             self._look_at_domain(proxy)
         return STATUS_OK

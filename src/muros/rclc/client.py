@@ -23,6 +23,7 @@ class Client(Handle):
 
     if TYPE_CHECKING:
         call = handles.call
+        wait_for_service = handles.wait_for_service
 
     def __init__(self, context: "Context", kind: "Any") -> None:
         super().__init__(context)

@@ -11,28 +11,49 @@ from muros.rclc import handles
 from muros.rclc import service as service_
 from muros.rclc.errors import RclError
 from muros.rclc.host_checks import WrongTypeError, be_callable, called, fits, other
+from muros.rclc.host_waiting import wait_confirmed
 from muros.rclc.outlet import body, outlet
 
 if TYPE_CHECKING:
     from muros.rclc._types import Publisher as AnyPublisher
-    from muros.rclc.hosts import Context
-
+    from muros.rclc.hosts import Context, Node
 
 
 class Publisher:
-    """Made by ``Node.publisher``. Everything but ``publish`` is that of the middleware's writer."""
+    """Made by ``Node.publisher``. What is not here is that of the middleware's writer."""
 
-    def __init__(self, writer: AnyPublisher, kind: Any) -> None:
+    session_timeout = 0.0
+    """Seconds for which ``publish`` waits until a message is confirmed, unless it is told; 0: it does not wait."""
+
+    def __init__(self, node: Node, writer: AnyPublisher, kind: Any, topic: str) -> None:
+        self._node = node
         self._writer = writer
         self._kind = kind
+        self.topic = topic
 
-    def publish(self, message: Any) -> bool:
-        """Sends a message; False when it was not taken. Raises TypeError for one of another type."""
+    def publish(self, message: Any, timeout: float | None = None) -> bool:
+        """Sends a message; False when it was not taken. Raises TypeError for one of another type.
+
+        It waits for nothing, unless there is a ``timeout`` (None: ``session_timeout``): then so many seconds at most
+        until a reliable message is confirmed, by the agent or straight in a space by every reader; False when it is not.
+        """
         if not isinstance(message, self._kind) and not fits(message, self._kind):
             raise other(message, self._kind, "publish")
         if outlet.task is not None:
             return outlet.task.publish(self._writer, message)
-        return self._writer.publish(message)
+        taken = self._writer.publish(message)
+        if timeout is None:
+            timeout = self.session_timeout
+        return taken and (not timeout or wait_confirmed(self._node.context, self._writer, timeout))
+
+    def count_subscriptions(self) -> int:
+        """Those that get what is published: through an agent all of the topic, see ``Node.graph``."""
+        matched: int | None = getattr(self._writer, "matched", None)
+        return len(self._node.graph.subscriptions(self.topic)) if matched is None else matched
+
+    def wait_for_subscriptions(self, count: int = 1, timeout: float | None = None) -> bool:
+        """Waits until there are so many, at most ``timeout`` seconds; whether there are. Not for callbacks."""
+        return self._node.graph.spin_until(lambda: self.count_subscriptions() >= count, timeout)
 
     def write_bytes(self, data: bytes) -> bool:
         """Sends a sample that is serialised already; False when it was not taken."""
@@ -51,6 +72,8 @@ class Service(service_.Service):
 
     name = ""
     context: Context
+    session_timeout = 0.0
+    """Seconds for which ``reply`` waits until an answer is confirmed; 0: it does not wait."""
 
     def reply(self, identity: bytes, response: Any) -> None:
         """Answers a request. Raises TypeError for what is no response of this service."""
@@ -64,6 +87,8 @@ class Service(service_.Service):
             outlet.task.hold(self, lambda: service_.Service.reply(self, identity, answer))
             return
         super().reply(identity, response)
+        if self.session_timeout:
+            wait_confirmed(self.context, self.entity, self.session_timeout)
 
     def destroy(self) -> None:
         """Takes it away."""
@@ -76,6 +101,21 @@ class Client(client_.Client):
 
     name = ""
     context: Context
+    node: Node
+    session_timeout = 0.0
+    """Seconds for which ``send`` waits until a request is confirmed; 0: it does not wait."""
+
+    def service_is_ready(self) -> bool:
+        """Whether somebody serves what is asked: through an agent as far as that tells, see ``Node.graph``."""
+        servers: int | None = getattr(self.entity, "servers", None)
+        return bool(self.node.graph.servers(self.name) if servers is None else servers)
+
+    def wait_for_service(self, timeout: float | None = None) -> bool:
+        """Waits until somebody serves what is asked, at most ``timeout`` seconds; whether somebody does.
+
+        The context takes messages meanwhile and no callback runs. Not for callbacks.
+        """
+        return self.node.graph.spin_until(self.service_is_ready, timeout)
 
     def send(
         self, request: Any, on_reply: Callable[[Any], object], timeout: float = client_._TIMEOUT
@@ -91,7 +131,10 @@ class Client(client_.Client):
             asked = Raw(body(request))
             outlet.task.hold(self, lambda: self._ask(asked, on_reply, timeout))
             return True
-        return super().send(request, on_reply, timeout)
+        taken = super().send(request, on_reply, timeout)
+        if not taken or not self.session_timeout:
+            return taken
+        return wait_confirmed(self.context, self.entity, self.session_timeout)
 
     def _ask(self, request: Raw, on_reply: Callable[[Any], object], timeout: float) -> bool:
         """Sends a request that LET has held back; one that is not taken then has no answer."""

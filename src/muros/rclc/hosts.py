@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from muros.rclc.action_hosts import ActionClient, ActionServer
     from muros.rclc.goals import Goal
     from muros.rclc.host_clock import Clock
+    from muros.rclc.host_graph import Graph
     from muros.rclc.host_parameters import Parameters
     from muros.rclc.lifecycle import Lifecycle
     from muros.rclc.logger import Logger
@@ -164,7 +165,7 @@ class Node(context_.Node):
     def publisher(self, kind: Any, topic: str, qos: str | Qos = "default") -> Publisher:
         """A publisher: ``publish(message)`` returns whether the message was taken."""
         be_message(kind)
-        return Publisher(node_.publisher(self, kind, topic, qos), kind)
+        return Publisher(self, node_.publisher(self, kind, topic, qos), kind, topic)
 
     def subscription(
         self, kind: Any, topic: str, callback: Callable[[Any], object] | None, qos: str | Qos = "default"
@@ -210,6 +211,7 @@ class Node(context_.Node):
         full = self._resolve(name)
         made = Client(self.context, kind)
         made.name = full
+        made.node = self
         requester = self.context.middleware.requester
         return self._join(made, lambda: requester(self.participant, made.name, kind.TYPE, made.deliver, qos))
 
@@ -250,6 +252,16 @@ class Node(context_.Node):
         made = self.__dict__["_parameters"] = Parameters(self, max, notify, undeclared, low_memory, longest)
         if "_clock" in self.__dict__:
             self.clock.follow(made)
+        return made
+
+    @property
+    def graph(self) -> Graph:
+        """The graph as this node sees it, from when it is first used: nodes, topics, services, and waiting for them."""
+        made: Graph | None = self.__dict__.get("_graph")
+        if made is None:
+            from muros.rclc.host_graph import Graph
+
+            made = self.__dict__["_graph"] = Graph(self)
         return made
 
     @property

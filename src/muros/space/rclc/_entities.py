@@ -97,6 +97,18 @@ class Publisher(_Entity):
         """Sends a message; False when it was not taken."""
         return self.write_bytes(_encode(message))
 
+    @property
+    def matched(self) -> int:
+        """Readers that get what is published."""
+        with self._lock:
+            return len(self.entity.matched)
+
+    @property
+    def acknowledged(self) -> bool:
+        """Whether all that was published has reached every reliable reader."""
+        with self._lock:
+            return self.entity.closed or self.entity.acknowledged
+
     def write_bytes(self, data: bytes) -> bool:
         """Sends a sample that is serialised already."""
         with self._lock:
@@ -190,6 +202,12 @@ class Requester(Receiver):
         super().__init__(node, name, type_name)
         self.callback = on_reply
         self.entity = node.participant.requester(_service(name, type_name), qos, on_data=self.came)
+
+    @property
+    def servers(self) -> int:
+        """Servers that a request goes to."""
+        with self._lock:
+            return self.entity.servers
 
     def room(self) -> bool:
         """Whether a request that is sent now can go out: one without a server waits for it in the space."""

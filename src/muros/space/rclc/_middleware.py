@@ -26,6 +26,7 @@ from muros.space.rclc._entities import (
     Replier,
     Requester,
 )
+from muros.space.rclc._graph import SpaceGraph
 from muros.space.rclc._problems import NOT_SPUN, code_of, line_of
 
 if TYPE_CHECKING:
@@ -192,8 +193,7 @@ class SpaceMiddleware:
     def wake(self) -> None:
         """Ends a wait; from any thread."""
         with self._server.lock:
-            self._woken = True
-            self._server.wake(self)
+            self.stir()
 
     def close(self) -> None:
         """Leaves the space, with every node; problems not told yet are told. Closing twice is allowed."""
@@ -211,7 +211,16 @@ class SpaceMiddleware:
         if failure is not None:
             raise failure
 
+    def graph_source(self, participant: Node, on_change: Callable[[], object], /) -> SpaceGraph:
+        """The graph as a node sees it; `on_change()` is called at changes, by whichever thread serves the space."""
+        return SpaceGraph(self, participant.participant.domain, on_change)
+
     # For entities
+
+    def stir(self) -> None:
+        """Something has happened: ends a wait. To be called with the lock held."""
+        self._woken = True
+        self._server.wake(self)
 
     def announce(self, receiver: Receiver) -> None:
         """Something has come for `receiver`, told by the space."""

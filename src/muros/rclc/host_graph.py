@@ -1,0 +1,282 @@
+"""The graph on hosts: what a node sees of all others, as values, and waiting for them.
+
+    node.graph.nodes()                                  # ["/greenhouse/thermometer", ...]
+    node.graph.topics()                                 # {"/chatter": ["std_msgs/msg/String"], ...}
+    node.graph.publishers("chatter")                    # [Endpoint(node="/talker", ...)]
+    node.graph.wait_for_node("/talker", timeout=5.0)
+    node.graph.on_change(lambda graph: print(graph.nodes()))
+
+Straight in a data space the graph is the space's own. Through an agent it is what the agent publishes, see ``graph``:
+without QoS, hashes and gids, and empty where an agent publishes none. Names given are relative to the node.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+from muros.rclc import graph as topic
+from muros.rclc import handles
+from muros.rclc.executor import Handle
+from muros.rclc.host_waiting import spin_until
+
+if TYPE_CHECKING:
+    from muros.rclc.context import Context
+    from muros.rclc.hosts import Node
+    from muros.xrce._types import Buffer
+
+__all__ = ["AgentGraph", "Endpoint", "Graph", "GraphSource", "GraphWatch"]
+
+PUBLISHER: Final = 0
+SUBSCRIPTION: Final = 1
+SERVER: Final = 2
+CLIENT: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """Something that a node made. ``kind`` is PUBLISHER, SUBSCRIPTION, SERVER or CLIENT."""
+
+    kind: int
+    name: str
+    """Full name of the topic or service."""
+    type: str
+    """As in ROS: std_msgs/msg/String. A DDS name that ROS has not made is left as it is."""
+    node: str
+    """Full name of the node; empty for an endpoint of none."""
+    gid: bytes = b""
+    """16 bytes; empty through an agent."""
+    qos: Any = None
+    """A ``muros.space.Qos``; None through an agent."""
+    type_hash: str = ""
+    """RIHS01_...; empty when unknown."""
+
+
+class GraphSource(Protocol):
+    """Where a graph comes from."""
+
+    @property
+    def changes(self) -> int:
+        """Counts changes."""
+
+    @property
+    def known(self) -> bool:
+        """Whether anything is known at all."""
+
+    def read(self) -> tuple[list[str], list[Endpoint]]:
+        """The full names of all nodes, and all that they made."""
+
+    def close(self) -> None:
+        """Watches no more."""
+
+
+class Graph:
+    """Made by ``Node.graph``; what others see of this node is in it too."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._watches: list[GraphWatch] = []
+        self._read: tuple[list[str], list[Endpoint]] = ([], [])
+        self._fresh = -1
+        middleware: Any = node.context.middleware
+        self._source: GraphSource
+        if hasattr(middleware, "graph_source"):
+            self._source = middleware.graph_source(node.participant, self._changed)
+        else:
+            self._source = AgentGraph(middleware, node.participant, self._changed)
+        node.entities.append(self)
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a graph to ask: through an agent, once it has told one."""
+        return self._source.known
+
+    @property
+    def changes(self) -> int:
+        """Counts the changes that were seen."""
+        return self._source.changes
+
+    def nodes(self) -> list[str]:
+        """The full names of all nodes, sorted; a name that several have is there several times."""
+        return sorted(self._nodes())
+
+    def topics(self) -> dict[str, list[str]]:
+        """All topics that somebody publishes or hears, by name, with their types."""
+        return _types(self._of(PUBLISHER) + self._of(SUBSCRIPTION))
+
+    def services(self) -> dict[str, list[str]]:
+        """All services that somebody serves or calls, by name, with their types."""
+        return _types(self._of(SERVER) + self._of(CLIENT))
+
+    def publishers(self, name: str | None = None, *, node: str | None = None) -> list[Endpoint]:
+        """The publishers of a topic, or of a node, or all."""
+        return self._of(PUBLISHER, name and self._node.resolve_topic(name), node)
+
+    def subscriptions(self, name: str | None = None, *, node: str | None = None) -> list[Endpoint]:
+        """The subscriptions of a topic, or of a node, or all."""
+        return self._of(SUBSCRIPTION, name and self._node.resolve_topic(name), node)
+
+    def servers(self, name: str | None = None, *, node: str | None = None) -> list[Endpoint]:
+        """Who serves a service, or all that a node serves, or all."""
+        return self._of(SERVER, name and self._node.resolve_service(name), node)
+
+    def clients(self, name: str | None = None, *, node: str | None = None) -> list[Endpoint]:
+        """Who calls a service, or all that a node calls, or all."""
+        return self._of(CLIENT, name and self._node.resolve_service(name), node)
+
+    def wait(self, condition: Callable[[Graph], object], timeout: float | None = None) -> bool:
+        """Waits until ``condition(graph)`` is true, at most ``timeout`` seconds (None: for ever); whether it is.
+
+        The context takes messages meanwhile and no callback runs. Not for callbacks: those have ``on_change``.
+        """
+        seen = -1
+        holds = False
+
+        def look() -> bool:
+            nonlocal seen, holds
+            if seen != self.changes:
+                seen = self.changes
+                holds = bool(condition(self))
+            return holds
+
+        return self.spin_until(look, timeout)
+
+    def spin_until(self, condition: Callable[[], object], timeout: float | None = None) -> bool:
+        """Waits until ``condition()`` is true, which is asked whenever anything has come; else as ``wait``."""
+        return spin_until(self._node.context, condition, timeout)
+
+    def wait_for_node(self, name: str, timeout: float | None = None) -> bool:
+        """Waits until there is a node of that full name, or of that name in this node's namespace."""
+        full = self._node_name(name)
+        return self.wait(lambda graph: full in graph._nodes(), timeout)
+
+    def wait_for_publishers(self, name: str, count: int = 1, timeout: float | None = None) -> bool:
+        """Waits until a topic has so many publishers."""
+        return self.wait(lambda graph: len(graph.publishers(name)) >= count, timeout)
+
+    def wait_for_subscriptions(self, name: str, count: int = 1, timeout: float | None = None) -> bool:
+        """Waits until a topic has so many subscriptions."""
+        return self.wait(lambda graph: len(graph.subscriptions(name)) >= count, timeout)
+
+    def wait_for_service(self, name: str, timeout: float | None = None) -> bool:
+        """Waits until somebody serves a service. ``Client.wait_for_service`` waits until it can be called as well."""
+        return self.wait(lambda graph: graph.servers(name), timeout)
+
+    def on_change(self, callback: Callable[[Graph], object]) -> GraphWatch:
+        """Has an executor call ``callback(graph)`` after changes, several of them at once perhaps.
+
+        The handle that it returns ends that with ``destroy()``.
+        """
+        made = GraphWatch(self._node.context, self, callback)
+        self._watches.append(made)
+        return made
+
+    def destroy(self) -> None:
+        """Watches no more; done with the node."""
+        for watch in list(self._watches):
+            watch.destroy()
+        self._source.close()
+
+    def _changed(self) -> None:
+        """The source has changed; any thread may say so."""
+        for watch in self._watches:
+            watch.changed = True
+
+    def _look(self) -> tuple[list[str], list[Endpoint]]:
+        changes = self._source.changes
+        if self._fresh != changes:
+            self._read = self._source.read()
+            self._fresh = changes
+        return self._read
+
+    def _nodes(self) -> list[str]:
+        return self._look()[0]
+
+    def _of(self, kind: int, name: str | None = None, node: str | None = None) -> list[Endpoint]:
+        full = node and self._node_name(node)
+        return [
+            endpoint
+            for endpoint in self._look()[1]
+            if endpoint.kind == kind
+            and (name is None or endpoint.name == name)
+            and (full is None or endpoint.node == full)
+        ]
+
+    def _node_name(self, name: str) -> str:
+        return name if name.startswith("/") else f"{self._node.namespace.rstrip('/')}/{name}"
+
+
+class GraphWatch(Handle):
+    """Made by ``Graph.on_change``: an executor calls ``callback(graph)`` when the graph has changed."""
+
+    def __init__(self, context: Context, graph: Graph, callback: Callable[[Graph], object]) -> None:
+        super().__init__(context)
+        self.callback = callback
+        self.changed = False
+        self._graph = graph
+
+    def ready(self, now: int) -> bool:
+        """Whether the graph has changed."""
+        return self.changed
+
+    def run(self, now: int) -> None:
+        """Calls the callback."""
+        self.changed = False
+        self.callback(self._graph)
+
+    def destroy(self) -> None:
+        """Watches no more."""
+        if self in self._graph._watches:
+            self._graph._watches.remove(self)
+        handles.destroy(self)
+
+
+class AgentGraph:
+    """The graph that an agent publishes, taken by a session."""
+
+    def __init__(self, session: Any, participant: Any, on_change: Callable[[], object]) -> None:
+        self.changes = 0
+        self.known = False
+        self.malformed = 0
+        self._on_change = on_change
+        self._nodes: list[str] = []
+        self._endpoints: list[Endpoint] = []
+        self._reader = session.reader(participant, topic.TOPIC, topic.TYPE, topic.QOS, self._take)
+
+    def read(self) -> tuple[list[str], list[Endpoint]]:
+        """What was told last."""
+        return self._nodes, self._endpoints
+
+    def close(self) -> None:
+        """Listens no more."""
+        self._reader.destroy()
+
+    def _take(self, buf: Buffer, off: int, n: int) -> None:
+        nodes: list[str] = []
+        endpoints: list[Endpoint] = []
+
+        def visit(node: str, kind: int, name: str, types: list[str]) -> None:
+            if kind == topic.NODE:
+                nodes.append(node)
+            else:
+                endpoints.extend(Endpoint(kind, name, one, node) for one in types or [""])
+
+        try:
+            topic.read_untrusted(buf, off, n, visit)
+        except ValueError:
+            self.malformed += 1
+            return
+        if not self.known or (nodes, endpoints) != (self._nodes, self._endpoints):
+            self.known = True
+            self._nodes, self._endpoints = nodes, endpoints
+            self.changes += 1
+            self._on_change()
+
+
+def _types(endpoints: Iterable[Endpoint]) -> dict[str, list[str]]:
+    """Types by name, both sorted."""
+    found: dict[str, set[str]] = {}
+    for endpoint in endpoints:
+        found.setdefault(endpoint.name, set()).add(endpoint.type)
+    return {name: sorted(found[name]) for name in sorted(found)}
