@@ -17,6 +17,7 @@ import traceback
 from collections.abc import Callable, Generator
 from typing import Any, TypeVar
 
+from muros.client.session import Session
 from muros.rclc import context as context_
 from muros.rclc import executor as executor_
 from muros.rclc import handles
@@ -92,7 +93,8 @@ class Executor(executor_.Executor):
         self.errors = 0
         self.on_overrun = on_overrun
         self.let: HostLet | None = HostLet(self, self.period, overrun, messages) if semantics == LET else None
-        self._always: set[Any] = set()
+        self.always: list[Any] = []
+        """The subscriptions that are called in each pass."""
         self.due: float | None = None
 
     # What is run
@@ -142,14 +144,10 @@ class Executor(executor_.Executor):
     def remove(self, handle: Any) -> None:
         """Runs a handle no more; the others keep their order. Raises HandleError when it is not here."""
         handles.remove(self, handle)
-        self._always.discard(handle)
+        if handle in self.always:
+            self.always.remove(handle)
         if self.let is not None:
             self.let.drop(handle)
-
-    @property
-    def always(self) -> set[Any]:
-        """The subscriptions that are called in each pass."""
-        return self._always
 
     @property
     def tasks(self) -> list[Task]:
@@ -246,13 +244,13 @@ class Executor(executor_.Executor):
         if self.let is not None:
             return bool(self.let.work(now))
         trigger = self.trigger
-        if self._always:
+        if self.always:
             if not self._wanted(now, late):
                 return False
         elif trigger is not None and not trigger(self.handles):
             return False
         ran = False
-        always = self._always
+        always = self.always
         for handle in self.handles:
             if handle.ready(now) or handle in always:
                 ran = True
@@ -380,13 +378,16 @@ class Executor(executor_.Executor):
             return result
 
     def _wait(self, left: float) -> None:
-        """Waits until something may have come, at most so many ms. Systems count whole ones: what is less is slept."""
-        if left >= 1:
-            self.context.middleware.wait(int(left))
+        """Waits until something may have come, at most so many ms."""
+        middleware = self.context.middleware
+        if not isinstance(middleware, Session):
+            middleware.wait(left)  # type: ignore[arg-type]  # boards count whole ones
+        elif left >= 1:
+            middleware.wait(int(left))
         elif self.context.clock is ticks:
-            time.sleep(left / 1000)
+            time.sleep(left / 1000)  # transports count whole ones
         else:
-            self.context.middleware.wait(1)
+            middleware.wait(1)
 
     def _period(self, period: float | None) -> float:
         if period is not None:

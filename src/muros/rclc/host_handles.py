@@ -62,20 +62,20 @@ class Subscription(subscription_.Subscription):
 
     def deliver(self, buf: Buffer, off: int, n: int) -> None:
         """Takes a sample of the middleware."""
-        if len(self._waiting) >= self.depth:
-            if self.eager:
-                self._run_early()
-            else:
-                self._waiting.popleft()
-                self.lost += 1
         message = self._kind()
         try:
             message.read(buf, off, n)
         except ValueError:
             self.malformed += 1
             self._tell(n)
-        else:
-            self._waiting.append(message)
+            return
+        self._waiting.append(message)
+        if len(self._waiting) > self.depth:
+            if self.eager:
+                self._run_early()
+            else:
+                self._waiting.popleft()
+                self.lost += 1
 
     def _run_early(self) -> None:
         try:
