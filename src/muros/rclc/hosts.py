@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from muros.rclc.action_hosts import ActionClient, ActionServer
     from muros.rclc.goals import Goal
     from muros.rclc.host_clock import Clock
+    from muros.rclc.host_events import Event, Events
     from muros.rclc.host_graph import Graph
     from muros.rclc.host_parameters import Parameters
     from muros.rclc.lifecycle import Lifecycle
@@ -253,6 +254,16 @@ class Node(context_.Node):
         if "_clock" in self.__dict__:
             self.clock.follow(made)
         return made
+
+    def on_events(self, entity: Publisher | Subscription, **callbacks: Callable[[Event], object]) -> Events:
+        """Has an executor call ``callback(event)`` when something becomes of a publisher or subscription of ours.
+
+        ``deadline_missed``, ``message_lost``, and straight in a data space ``matched`` and ``incompatible_qos``: an agent
+        does not tell of those (RclError with code 3, unsupported). The handle that it returns ends it with ``destroy()``.
+        """
+        from muros.rclc.host_events import make
+
+        return make(self, entity, callbacks)
 
     @property
     def graph(self) -> Graph:

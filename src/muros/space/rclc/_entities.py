@@ -132,6 +132,15 @@ class Receiver(_Entity):
     announced = False
     """Whether the context knows already that there is something to hand on."""
 
+    @property
+    def taker(self) -> Any:
+        """What takes what comes, the callback; it may be exchanged."""
+        return self.callback
+
+    @taker.setter
+    def taker(self, taker: Any) -> None:
+        self.callback = taker
+
     def hand_on(self) -> tuple[int, Exception | None]:
         """Hand on what is there now; how many that were, and what a callback raised."""
         self.announced = False

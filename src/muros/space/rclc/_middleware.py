@@ -26,6 +26,7 @@ from muros.space.rclc._entities import (
     Replier,
     Requester,
 )
+from muros.space.rclc._events import SpaceEvents
 from muros.space.rclc._graph import SpaceGraph
 from muros.space.rclc._problems import NOT_SPUN, code_of, line_of
 
@@ -156,9 +157,11 @@ class SpaceMiddleware:
         self._fresh = self._woken = False
         taken = 0
         for _ in range(len(self.ready)):
-            if not self.ready:
-                break  # a callback has closed the context
-            taken_here, error = self.ready.popleft().hand_on()
+            try:
+                receiver = self.ready.popleft()
+            except IndexError:
+                break  # a callback, or another thread, has closed the context
+            taken_here, error = receiver.hand_on()
             taken += taken_here
             failure = failure or error
         failure = self._tell() or failure
@@ -214,6 +217,10 @@ class SpaceMiddleware:
     def graph_source(self, participant: Node, on_change: Callable[[], object], /) -> SpaceGraph:
         """The graph as a node sees it; `on_change()` is called at changes, by whichever thread serves the space."""
         return SpaceGraph(self, participant.participant.domain, on_change)
+
+    def event_source(self, owner: object, entity: Publisher | Reader, /) -> SpaceEvents:
+        """Who counts what happens to a writer or reader, made for `owner`."""
+        return SpaceEvents(self, owner, entity)
 
     # For entities
 

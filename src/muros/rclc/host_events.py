@@ -1,0 +1,213 @@
+"""What becomes of the quality of service of publishers and subscriptions: callbacks that executors run. For hosts.
+
+    node.on_events(subscription, deadline_missed=lambda event: print(event.total), matched=print)
+
+Straight in a data space the space tells. Through an agent only deadlines and lost messages are known, for they are
+counted here: an agent does not tell its clients whom it has matched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+from muros.rclc import handles
+from muros.rclc.errors import RclError
+from muros.rclc.executor import _NEVER, Handle
+from muros.rclc.host_checks import WrongTypeError, be_callable
+from muros.rclc.host_entities import Publisher
+from muros.rclc.subscription import Subscription
+
+if TYPE_CHECKING:
+    from muros.rclc.hosts import Node
+    from muros.xrce._types import Buffer
+
+__all__ = ["Event", "EventSource", "Events", "SessionEvents", "make"]
+
+_UNSUPPORTED = 3
+DEADLINE_MISSED, INCOMPATIBLE_QOS, MATCHED, MESSAGE_LOST = NAMES = (
+    "deadline_missed",
+    "incompatible_qos",
+    "matched",
+    "message_lost",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What a callback is given."""
+
+    name: str
+    """deadline_missed, incompatible_qos, matched or message_lost."""
+    total: int
+    """How many there were: periods without a message, others that do not fit, matches, messages lost."""
+    change: int
+    """How many of them are new."""
+    current: int = 0
+    """How many are matched now."""
+    why: str = ""
+    """What does not fit, in words."""
+
+
+class EventSource(Protocol):
+    """Who counts what happens to one entity."""
+
+    names: tuple[str, ...]
+    """What it counts."""
+
+    def count(self, name: str, now: int) -> int:
+        """How many there were until now."""
+
+    def current(self) -> int:
+        """How many are matched now."""
+
+    def why(self) -> str:
+        """What did not fit last."""
+
+    def left(self, now: int) -> int:
+        """Milliseconds until something may be counted without a message."""
+
+    def close(self) -> None:
+        """Counts no more."""
+
+
+class Events(Handle):
+    """Made by ``Node.on_events``. An executor calls the callbacks; ``destroy()`` ends that."""
+
+    def __init__(
+        self, node: Node, source: EventSource, callbacks: dict[str, Callable[[Event], object]]
+    ) -> None:
+        super().__init__(node.context)
+        self._source = source
+        self._callbacks = callbacks
+        now = node.context.clock()
+        past = (MATCHED, INCOMPATIBLE_QOS)  # what was there before is told as well
+        self._told = {name: 0 if name in past else source.count(name, now) for name in callbacks}
+        self._present = 0
+        node.entities.append(self)
+
+    def ready(self, now: int) -> bool:
+        """Whether there is something to tell."""
+        return any(self._news(name, now) for name in self._callbacks)
+
+    def run(self, now: int) -> None:
+        """Tells it."""
+        for name, callback in self._callbacks.items():
+            if self._news(name, now):
+                total = self._source.count(name, now)
+                change = total - self._told[name]
+                self._told[name] = total
+                self._present = self._source.current()
+                why = self._source.why() if name == INCOMPATIBLE_QOS else ""
+                callback(Event(name, total, change, self._present if name == MATCHED else 0, why))
+
+    def left(self, now: int) -> int:
+        """Milliseconds until something may be told without a message."""
+        return self._source.left(now)
+
+    def destroy(self) -> None:
+        """Tells no more."""
+        self._source.close()
+        handles.destroy(self)
+
+    def _news(self, name: str, now: int) -> bool:
+        if name == MATCHED and self._source.current() != self._present:
+            return True
+        return self._source.count(name, now) != self._told[name]
+
+
+class SessionEvents:
+    """Counts what is known of an entity at an agent: its deadline, and what was lost here."""
+
+    names: tuple[str, ...] = (DEADLINE_MISSED, MESSAGE_LOST)
+
+    def __init__(self, owner: Any, entity: Any, clock: Callable[[], int]) -> None:
+        self._owner = owner
+        self._period: int = entity.qos.deadline
+        self._clock = clock
+        self._missed = 0
+        self._base: int | None = None  # the tick of the last message, or of the last period that was missed
+        self._entity = entity
+        if isinstance(owner, Subscription):
+            self._deliver = entity.deliver
+            entity.deliver = self._take
+        else:
+            self._publish = entity.publish
+            entity.publish = self._send
+
+    def count(self, name: str, now: int) -> int:
+        """How many there were until now."""
+        if name == MESSAGE_LOST:
+            return int(getattr(self._owner, "lost", 0))
+        self._look(now)
+        return self._missed
+
+    def current(self) -> int:
+        """Nobody knows."""
+        return 0
+
+    def why(self) -> str:
+        """Nobody knows."""
+        return ""
+
+    def left(self, now: int) -> int:
+        """Milliseconds until the deadline."""
+        if self._base is None or not self._period:
+            return _NEVER
+        return max(self._base + self._period - now, 0)
+
+    def close(self) -> None:
+        """Counts no more."""
+        self._period = 0
+
+    def _take(self, buf: Buffer, off: int, n: int) -> None:
+        self._touch()
+        self._deliver(buf, off, n)
+
+    def _send(self, message: Any) -> bool:
+        taken: bool = self._publish(message)
+        if taken:
+            self._touch()
+        return taken
+
+    def _touch(self) -> None:
+        """A message: the first one starts the watch (DDS 1.4, 2.2.3.7)."""
+        now = self._clock()
+        self._look(now)
+        self._base = now
+
+    def _look(self, now: int) -> None:
+        if self._base is not None and self._period:
+            periods = int((now - self._base) // self._period)
+            self._missed += periods
+            self._base += periods * self._period
+
+
+def make(node: Node, owner: Any, callbacks: dict[str, Callable[[Event], object]]) -> Events:
+    """The events of a publisher or subscription of a node; see ``Node.on_events``."""
+    for name, callback in callbacks.items():
+        if name not in NAMES:
+            raise WrongTypeError(f"there is no event {name!r}: {', '.join(NAMES)}")
+        be_callable(callback, f"the callback of {name}")
+    if isinstance(owner, Publisher):
+        entity: Any = owner._writer
+    elif isinstance(owner, Subscription):
+        entity = owner.entity
+    else:
+        raise WrongTypeError(f"publishers and subscriptions have events, not {owner!r}")
+    open_source = getattr(node.context.middleware, "event_source", None)
+    source: EventSource
+    if open_source is None:
+        source = SessionEvents(owner, entity, node.context.clock)
+    else:
+        source = open_source(owner, entity)
+    for name in callbacks:
+        if name not in source.names:
+            source.close()
+            error = RclError(
+                f"an agent does not tell of {name}: only {' and '.join(source.names)} are known here"
+            )
+            error.code = _UNSUPPORTED
+            raise error
+    return Events(node, source, callbacks)
