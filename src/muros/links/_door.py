@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple, Protocol, TypeAlias
 
@@ -105,6 +105,8 @@ class Link(ABC):
 
     def __init__(self) -> None:
         self.counters = LinkCounters()
+        self.on_peer: Callable[[Address], object] | None = None
+        """Called when somebody can be reached who has said nothing yet: a port was opened, a connection came."""
         self._events: LinkEvents | None = None
 
     @property
@@ -149,6 +151,10 @@ class Link(ABC):
         counters.sent_bytes += size
         return True
 
+    def backlog(self, address: Address) -> int:
+        """Bytes that wait in the link's own queue for this peer; 0 where nothing waits, or nobody is."""
+        return 0
+
     def describe(self, address: Address) -> str:
         """The address for people: ``192.168.1.23:50210``, ``/dev/ttyUSB0#1``."""
         return str(address)
@@ -182,6 +188,15 @@ class Link(ABC):
         counters.received_bytes += len(message)
         try:
             events.on_message(self, message, address)
+        except Exception as error:
+            self._owner_failed(error)
+
+    def _peer(self, address: Address) -> None:
+        """Somebody can be reached: told only to who asked for it."""
+        if self.on_peer is None or self._events is None:
+            return
+        try:
+            self.on_peer(address)
         except Exception as error:
             self._owner_failed(error)
 

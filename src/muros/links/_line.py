@@ -40,6 +40,10 @@ class LineLink(Link):
         """The devices that are open now."""
         return list(self._ports)
 
+    def backlog(self, address: Address) -> int:
+        port = self._ports.get(address.device) if isinstance(address, LineAddress) else None
+        return 0 if port is None else port.channel.queued
+
     def describe(self, address: Address) -> str:
         return f"{address.device}#{address.peer}" if isinstance(address, LineAddress) else str(address)
 
@@ -56,6 +60,13 @@ class LineLink(Link):
 
     def _noise_remedy(self) -> str:
         return "Check what the far end sends: frames of DDS-XRCE for serial lines are expected."
+
+    def _opened(self, port: Port, detail: str) -> None:
+        """A port is open: whoever sits there alone can be spoken to."""
+        self._up(detail)
+        if self.on_peer is not None and self._ports.get(port.device) is port:
+            address = port.addresses[0] = LineAddress(port.device, 0)
+            self._peer(address)
 
     def _messages(self, port: Port, messages: list[tuple[bytes, int]]) -> None:
         port.garbage = 0

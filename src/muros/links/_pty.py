@@ -61,9 +61,9 @@ class PseudoterminalLink(LineLink):
         os.set_blocking(near, False)
         make_raw(far)
         self._device = os.ttyname(far)
-        self._ports[self._device] = Port(self, self._device, near, close)
+        port = self._ports[self._device] = Port(self, self._device, near, close)
         self._link_far_end()
-        self._up(self.name)
+        self._opened(port, self.name)
 
     def _close(self) -> None:
         super()._close()

@@ -116,8 +116,8 @@ class SerialLink(LineLink):
             self._say_once(device, Cause("port-unusable", error.why, error.remedy))
             return
         self._told.pop(device, None)
-        self._ports[device] = Port(self, device, fd, close_terminal)
-        self._up(f"{device} at {self.baud}")
+        port = self._ports[device] = Port(self, device, fd, close_terminal)
+        self._opened(port, f"{device} at {self.baud}")
 
     def _say_once(self, device: str, cause: Cause) -> None:
         """Says once why a port does not open, not at every look."""

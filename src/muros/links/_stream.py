@@ -14,7 +14,7 @@ from collections.abc import Callable
 from muros.links._framing import Cutter, Framing
 
 READ_BYTES = 65536
-"""Most bytes read from a stream in one wake-up."""
+"""Most bytes read from a stream in one wake-up, unless it is said otherwise."""
 
 
 class ByteStream:
@@ -31,8 +31,10 @@ class ByteStream:
         queue_bytes: int,
         on_bytes: Callable[[bytes], None],
         on_end: Callable[[str], None],
+        read_bytes: int = READ_BYTES,
     ) -> None:
         self._fd = fd
+        self._read_bytes = read_bytes
         self._limit = queue_bytes
         self._on_bytes = on_bytes
         self._on_end = on_end
@@ -78,7 +80,7 @@ class ByteStream:
 
     def _readable(self) -> None:
         try:
-            data = os.read(self._fd, READ_BYTES)
+            data = os.read(self._fd, self._read_bytes)
         except (BlockingIOError, InterruptedError):
             return
         except OSError as error:
@@ -123,12 +125,13 @@ class Channel:
         on_messages: Callable[[list[tuple[bytes, int]]], None],
         on_damage: Callable[[dict[str, int]], None],
         on_end: Callable[[str], None],
+        read_bytes: int = READ_BYTES,
     ) -> None:
         self._framing = framing
         self._cutter = Cutter(framing)
         self._on_messages = on_messages
         self._on_damage = on_damage
-        self._stream = ByteStream(fd, queue_bytes, self._take, on_end)
+        self._stream = ByteStream(fd, queue_bytes, self._take, on_end, read_bytes)
 
     @property
     def queued(self) -> int:

@@ -12,7 +12,7 @@ from typing import ClassVar
 from muros.links._door import NO_PEER, QUEUE_FULL, Address, Cause, Link, Locator
 from muros.links._framing import MESSAGE_BYTES, LengthFraming, MakeFraming
 from muros.links._sockets import ANY, bound_socket, join, socket_locators
-from muros.links._stream import Channel
+from muros.links._stream import READ_BYTES, Channel
 from muros.links._udp import AGENT_PORT
 
 CONNECTIONS = 100
@@ -32,7 +32,8 @@ class TcpLink(Link):
     """Connections to ``port`` (0: any free one) of ``host`` (default: every address); ``family`` is 4 or 6.
 
     An address is the far end's ``(host, port)``. At most ``connections`` are held, further ones are closed at once.
-    ``queue_bytes`` bounds what waits for each. ``make_framing`` cuts the streams: XRCE's by default.
+    ``queue_bytes`` bounds what waits for each, ``read_bytes`` what is read from one before the others have their turn.
+    ``make_framing`` cuts the streams: XRCE's by default.
     """
 
     kind: ClassVar[str] = "tcp"
@@ -47,6 +48,7 @@ class TcpLink(Link):
         connections: int = CONNECTIONS,
         queue_bytes: int = QUEUE_BYTES,
         keepalive: int = KEEPALIVE_S,
+        read_bytes: int = READ_BYTES,
         make_framing: MakeFraming = LengthFraming,
     ) -> None:
         super().__init__()
@@ -56,6 +58,7 @@ class TcpLink(Link):
         self._limit = connections
         self._queue_bytes = queue_bytes
         self._keepalive = keepalive
+        self._read_bytes = read_bytes
         self._make_framing = make_framing
         self._listener: socket.socket | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -70,6 +73,10 @@ class TcpLink(Link):
     def peers(self) -> list[Address]:
         """The addresses that are connected now."""
         return list(self._connections)
+
+    def backlog(self, address: Address) -> int:
+        connection = self._connections.get(address)
+        return 0 if connection is None else connection.channel.queued
 
     def describe(self, address: Address) -> str:
         return join(str(address[0]), int(address[1])) if isinstance(address, tuple) else str(address)
@@ -128,6 +135,7 @@ class TcpLink(Link):
                 self._refuse(address)
             else:
                 self._connections[address] = _Connection(self, sock, address)
+                self._peer(address)
 
     def _refuse(self, address: Address) -> None:
         self.counters.dropped["too-many-connections"] += 1
@@ -188,6 +196,7 @@ class _Connection:
             partial(link._messages, self),
             partial(link._damaged, self),
             partial(link._ended, self),
+            link._read_bytes,
         )
 
 

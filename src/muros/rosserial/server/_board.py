@@ -1,0 +1,684 @@
+"""One board on one line: negotiation, time, and the signs by which a server knows how the board is.
+
+A board says nothing until it is asked for its topics; then it asks for the time, names everything it has, and counts
+itself as connected for as long as its requests for the time are answered. There is no end mark, no acknowledgement,
+and no sign of a restart. So the server goes by these:
+
+- Any good frame is a sign of life. A board that has asked for the time before and is silent longer than it takes
+  until it must ask again is asked for its topics once a second.
+- A connected board passes over the two bytes ``FF 00``; an unconnected one answers with a request for the time, to show
+  which version it speaks. While a board sends nothing it gets them twice a second, and a request for the time that
+  is not due means that it has started again.
+- A frame of an unknown topic means that something was lost, or that the board has started again with other topics.
+- Topics that stay unnamed after two requests are gone; damage on the line while they are named brings another request.
+
+What a request names again stays as it is: nobody in the graph sees a board's restart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import TYPE_CHECKING, Any
+
+from muros.rosserial.constants import (
+    ID_FIRST_TOPIC,
+    ID_LOG,
+    ID_PARAMETER_REQUEST,
+    ID_PUBLISHER,
+    ID_SERVICE_CLIENT,
+    ID_SERVICE_SERVER,
+    ID_SUBSCRIBER,
+    ID_TIME,
+    ID_TX_STOP,
+    OVERHEAD,
+    VERSION_GROOVY,
+    VERSION_HYDRO,
+)
+from muros.rosserial.messages import (
+    MessageError,
+    TopicInfo,
+    log_untrusted,
+    parameter_request_untrusted,
+    topic_info_untrusted,
+    write_time,
+)
+from muros.rosserial.packets import ANY_VERSION, Decoder, frame
+from muros.rosserial.server._diagnosis import Suspicions
+from muros.rosserial.server._door import Node, RefusedError
+from muros.rosserial.server._endpoints import (
+    Endpoint,
+    Publication,
+    ServiceClient,
+    ServiceServer,
+    Subscription,
+)
+from muros.rosserial.server._output import Link, Output
+from muros.rosserial.server._parameters import answer_of, plain_name
+from muros.rosserial.server.events import (
+    BoardBack,
+    BoardHeard,
+    BoardLog,
+    BoardLost,
+    BoardReady,
+    BoardReset,
+    EndpointSetUp,
+)
+
+if TYPE_CHECKING:
+    from muros.rosserial.server._core import ServerCore
+    from muros.xrce._types import Buffer
+
+__all__ = ["Board"]
+
+PROBE = bytes.fromhex("fffe0000ff0000ff00ffff00000000ff00")
+"""Topic requests of both versions, parted by 00 so that a board of either understands its own."""
+CHECK = b"\xff\x00"
+"""What an unconnected board answers and a connected one passes over."""
+
+# States
+AWAY = "away"
+"""There is no line to the board."""
+ASKING = "asking"
+"""The line is there; the board has not answered yet."""
+SYNCED = "synced"
+"""Topics flow."""
+SILENT = "silent"
+"""The board has not been heard for longer than it should be."""
+
+LINE_UP, LINE_DOWN, ANSWER, SILENCE = "line up", "line down", "answer", "silence"
+
+TRANSITIONS = {
+    (AWAY, LINE_UP): ASKING,
+    (ASKING, LINE_UP): ASKING,
+    (SYNCED, LINE_UP): ASKING,
+    (SILENT, LINE_UP): ASKING,
+    (ASKING, ANSWER): SYNCED,
+    (SYNCED, SILENCE): SILENT,
+    (SILENT, ANSWER): SYNCED,
+    (ASKING, LINE_DOWN): AWAY,
+    (SYNCED, LINE_DOWN): AWAY,
+    (SILENT, LINE_DOWN): AWAY,
+}
+"""What becomes of a board; what is not here changes nothing. An answer is any frame while silent, else one that
+belongs to negotiation."""
+
+_TIME_PERIOD = 2_000
+"""A request for the time that comes earlier after the last one is not the regular one, in ms (that is 2.5 s)."""
+_OPEN = 3_000
+"""How long a topic request may still be answered, in ms."""
+_CHECK_AFTER = 700
+"""Silence before checks begin, in ms."""
+_TRIES = 3
+"""Unanswered topic requests in the version that was heard until both are tried again; also requests after damage."""
+_BRANCHES = {0: ID_PUBLISHER, 1: ID_SUBSCRIBER, 2: ID_SERVICE_SERVER, 3: ID_SERVICE_SERVER, 4: 4, 5: 4}
+_MISSES = 2
+_TIME_BYTES = 16
+
+
+class Board:
+    """A board. ``label`` is its line for people, ``key`` what it is known again by, ``node_name`` its full node name.
+
+    Counters are those of its ``decoder`` and its ``output``, and ``received_bytes``, ``asks`` (topic requests),
+    ``resets``, ``unknown`` (frames of unknown topics).
+    """
+
+    def __init__(
+        self, core: ServerCore, key: Hashable, label: str, node_name: str, link: Link, address: Hashable
+    ) -> None:
+        self.core = core
+        self.key = key
+        self.label = label
+        self.who = f"board {label}"
+        self.node_name = node_name
+        self.state = AWAY
+        self.version = 0
+        """The version it speaks; 0 until it was heard."""
+        self.decoder = Decoder(core.limits.max_payload, self._on_frame, ANY_VERSION)
+        self.output = Output(link, address, 0, core.limits.lead, core.limits.max_requests)
+        self.node: Node | None = None
+        self.endpoints: dict[tuple[int, str], Endpoint] = {}
+        self.input_buffer = 0
+        """The board's buffer for what it is sent; 0 until it was announced."""
+        self.output_buffer = 0
+        self.heard_at = 0
+        self.last_time: int | None = None
+        self.lost_at: int | None = None
+        self.due: int | None = None
+        self.received_bytes = 0
+        self.asks = 0
+        self.resets = 0
+        self.unknown = 0
+        self.round_trip: int | None = None
+        """From the last topic request to its first answer, in ms."""
+        self.suspicions = Suspicions(self)
+        self._now = 0
+        self._incoming: dict[int, Any] = {}
+        self._halves: dict[tuple[int, str], dict[int, TopicInfo]] = {}
+        self._round = 0
+        self._open_asks: list[int] = []
+        self._asked_at = 0
+        self._first_ask = 0
+        self._settle_at: int | None = None
+        self._misses = 0
+        self._damage = 0
+        self._told_ready = False
+        self._told_lost = False
+        self._checked_at = 0
+
+    @property
+    def in_sync(self) -> bool:
+        """Whether it may be sent messages."""
+        return self.state == SYNCED
+
+    @property
+    def reachable(self) -> bool:
+        """Whether there is a line to it."""
+        return self.state != AWAY
+
+    # What happens to the line
+
+    def line_up(self, link: Link, address: Hashable, byte_us: int, now: int) -> None:
+        """The line is there: the board is asked."""
+        self._now = now
+        self._step(LINE_UP)
+        self.output.link, self.output.address = link, address
+        self.output.byte_us = self.decoder.byte_us = byte_us
+        self.output.clear()
+        self.decoder.reset()
+        self.decoder.version = ANY_VERSION
+        self.decoder.limit = self.core.limits.max_payload
+        self.version = 0
+        self.last_time = None
+        self._open_asks.clear()
+        self._first_ask = self.heard_at = now
+        self._told_ready = False
+        self._restart()
+        self.suspicions.begin(now)
+        self._ask(now)
+        self._plan(now)
+
+    def line_down(self, reason: str, now: int) -> None:
+        """The line is gone; what the board has stays for a while."""
+        self._now = now
+        if self.state == AWAY:
+            return
+        self._step(LINE_DOWN)
+        self.output.clear()
+        self._restart()
+        self._lose(reason, now)
+        self._plan(now)
+
+    def receive(self, data: bytes, now: int) -> None:
+        """Bytes came."""
+        self._now = now
+        self.received_bytes += len(data)
+        decoder = self.decoder
+        before = decoder.frames
+        decoder.feed(data, len(data), now)
+        if decoder.frames == before:
+            self.suspicions.noise(data)
+        self.suspicions.look(now)
+        if decoder.pending or decoder.frames == before:
+            self._plan(now)
+        self.pump(now)
+
+    def stop(self) -> None:
+        """Tells the board that nobody listens any more, so that it waits to be asked."""
+        if self.state != AWAY and self.version:
+            self.output.clear()
+            self.output.post(frame(ID_TX_STOP, b"", self.version))
+            self.output.pump(self._now)
+
+    def close(self) -> None:
+        """Takes everything of it out of the world."""
+        for endpoint in self.endpoints.values():
+            endpoint.close()
+        self.endpoints.clear()
+        self._incoming.clear()
+        self._halves.clear()
+        if self.node is not None:
+            self.node.close()
+            self.node = None
+
+    # Time
+
+    def tick(self, now: int) -> None:
+        """Does what is due; ``due`` says when it wants to be called next."""
+        self._now = now
+        self.due = None
+        if self.decoder.pending:
+            self.decoder.tick(now)
+            self.suspicions.look(now)
+        if self.state == ASKING:
+            if now >= self._asked_at + self.core.limits.ask:
+                self._ask(now)
+            self.suspicions.unanswered(now)
+        elif self.state == SYNCED:
+            self._watch(now)
+        elif self.state == SILENT:
+            if now >= self._asked_at + self.core.limits.ask:
+                self._ask(now)
+            if not self._told_lost and now >= self.heard_at + self.core.limits.lost:
+                self._lose(f"silent for {(now - self.heard_at) / 1000:.0f} s", now)
+        for endpoint in list(self.endpoints.values()):
+            if isinstance(endpoint, ServiceServer) and endpoint.until is not None:
+                endpoint.turn(now)
+        if self.lost_at is not None and now >= self.lost_at + self.core.limits.keep_lost:
+            self._forget(now)
+        self._plan(now)
+        self.pump(now)
+
+    def wake(self, when: int) -> None:
+        """It wants to be called at ``when`` at the latest."""
+        if self.due is None or when < self.due:
+            self.due = when
+            self.core.wake(when)
+
+    def pump(self, now: int) -> None:
+        """Sends what can be sent."""
+        when = self.output.pump(now)
+        if when is not None:
+            self.wake(when)
+
+    def report(self, code: str, *, what: str, why: str, remedy: str, subject: str = "", n: int = 1) -> None:
+        """Counts a finding about it."""
+        self.core.report(code, who=self.who, subject=subject, what=what, why=why, remedy=remedy, n=n)
+
+    def _plan(self, now: int) -> None:
+        """Sees to the next call of `tick`."""
+        limits = self.core.limits
+        if self.decoder.pending:
+            self.wake(now + max(1, self.decoder.tick(now)))
+        if self.state in (ASKING, SILENT):
+            self.wake(self._asked_at + limits.ask)
+        elif self.state == SYNCED:
+            if self._settle_at is not None:
+                self.wake(self._settle_at)
+            if self.last_time is not None:
+                self.wake(self.heard_at + limits.silent)
+                if limits.check and self.version == VERSION_HYDRO:
+                    self.wake(max(self.heard_at + _CHECK_AFTER, self._checked_at + limits.check))
+        if self.lost_at is not None:
+            self.wake(self.lost_at + limits.keep_lost)
+
+    def _watch(self, now: int) -> None:
+        limits = self.core.limits
+        if self._settle_at is not None and now >= self._settle_at:
+            self._settled(now)
+        if self.last_time is None:
+            return  # it never asks for the time: its silence means nothing
+        silence = now - self.heard_at
+        if silence >= limits.silent:
+            self._step(SILENCE)
+            self._ask(now)
+        elif (
+            limits.check
+            and self.version == VERSION_HYDRO
+            and silence >= _CHECK_AFTER
+            and now >= self._checked_at + limits.check
+        ):
+            self._checked_at = now
+            self.output.post(CHECK)
+
+    def _step(self, what: str) -> None:
+        self.state = TRANSITIONS.get((self.state, what), self.state)
+        self.output.holds = self.state != SYNCED
+
+    # Negotiation
+
+    def _ask(self, now: int) -> None:
+        """Asks for topics; in both versions while it is not known which one is understood."""
+        self._open_asks = [at for at in self._open_asks if now - at < _OPEN]
+        if self.version and len(self._open_asks) >= _TRIES - 1:
+            self.decoder.version = ANY_VERSION
+        both = self.decoder.version == ANY_VERSION
+        self._round += 1
+        self.asks += 1
+        self._asked_at = now
+        self._open_asks.append(now)
+        self._damage = self.suspicions.damage
+        self.output.post(PROBE if both else frame(ID_PUBLISHER, b"", self.version))
+        self.pump(now)
+
+    def _answered(self, now: int) -> None:
+        """The board says something that belongs to negotiation."""
+        if self._open_asks:
+            self.round_trip = now - self._open_asks.pop(0)
+        self._settle_at = now + self.core.limits.settle
+        self.wake(self._settle_at)
+        if self.state != SYNCED:
+            self._heard_again(now)
+            self._step(ANSWER)
+        if self.node is None:
+            try:
+                self.node = self.core.world.node(self.node_name, self.who)
+            except RefusedError as error:
+                self.report(
+                    "node-refused",
+                    what=f"{self.who} cannot be the node {self.node_name}",
+                    why=error.why,
+                    remedy=error.remedy,
+                )
+
+    def _heard_again(self, now: int) -> None:
+        if self.lost_at is not None:
+            self.core.tell(BoardBack(self.label, (now - self.lost_at) / 1000))
+            self.lost_at = None
+        self._told_lost = False
+
+    def _settled(self, now: int) -> None:
+        """The board has said everything, as far as one can tell."""
+        self._settle_at = None
+        missing = [each for each in self.endpoints.values() if each.round != self._round]
+        halves = [name for (_, name), found in self._halves.items() if len(found) < 2]
+        damaged = self.suspicions.damage != self._damage
+        if (missing or halves or damaged) and self._misses < (_TRIES if damaged else _MISSES):
+            self._misses += 1
+            self._ask(now)
+            return
+        self._misses = 0
+        for endpoint in missing:
+            self._remove(endpoint)
+        if not self._told_ready and self.node is not None:
+            self._told_ready = True
+            self.core.tell(
+                BoardReady(
+                    self.label,
+                    self.node_name,
+                    self._count(Publication),
+                    self._count(Subscription),
+                    self._count(ServiceServer),
+                    self._count(ServiceClient),
+                    (now - self._first_ask) / 1000,
+                )
+            )
+            if not self.endpoints:
+                self.suspicions.no_topics()
+
+    def _count(self, kind: type[Endpoint]) -> int:
+        return sum(isinstance(each, kind) for each in self.endpoints.values())
+
+    def _lose(self, reason: str, now: int) -> None:
+        if self.node is not None and self.lost_at is None:
+            self._told_lost = True
+            self.lost_at = now
+            self.core.tell(BoardLost(self.label, reason, self.core.limits.keep_lost / 1000))
+
+    def _forget(self, now: int) -> None:
+        """It was away too long: its endpoints go, and it too if its line is gone."""
+        self.lost_at = None
+        if self.state == AWAY:
+            self.core.remove(self, f"it did not come back within {self.core.limits.keep_lost / 1000:.0f} s")
+            return
+        self.close()
+        self._told_ready = False
+
+    def _restart(self) -> None:
+        for endpoint in self.endpoints.values():
+            endpoint.restart()
+
+    # Frames
+
+    def _on_frame(self, topic_id: int, buf: Buffer, off: int, n: int) -> None:
+        now = self._now
+        if self.decoder.version != self.decoder.heard and not self._learn(topic_id):
+            return
+        self.heard_at = now
+        receive = self._incoming.get(topic_id)
+        if receive is not None:
+            if self.state == SILENT:
+                self._heard_again(now)
+                self._step(ANSWER)
+            receive(bytes(memoryview(buf)[off : off + n]), now)
+            return
+        if self.state == SILENT and topic_id != ID_TIME:
+            self._heard_again(now)
+            self._step(ANSWER)
+        try:
+            self._protocol(topic_id, buf, off, n, now)
+        except MessageError as error:
+            self.report(
+                "bad-protocol-message",
+                what=f"{{n}} message{{s}} of {self.who} on id {topic_id} passed over",
+                why=str(error),
+                remedy="Check that the firmware's rosserial library is whole; the board is asked again",
+            )
+            self._misses = 0
+            self._settle_at = now + self.core.limits.settle
+            self._damage = -1
+
+    def _learn(self, topic_id: int) -> bool:
+        """Which version the board speaks; False if that frame is more likely noise."""
+        heard = self.decoder.heard
+        if heard == VERSION_GROOVY and topic_id > ID_TX_STOP and not self._incoming:
+            return False
+        self.decoder.version = heard
+        if self.version != heard:
+            self.version = heard
+            self.core.tell(BoardHeard(self.label, heard))
+        return True
+
+    def _protocol(self, topic_id: int, buf: Buffer, off: int, n: int, now: int) -> None:
+        if topic_id == ID_TIME:
+            self._time(now)
+        elif topic_id in _BRANCHES:
+            self._named(topic_id, topic_info_untrusted(buf, off, n), now)
+        elif topic_id == ID_LOG:
+            level, text = log_untrusted(buf, off, n)
+            self._log(level, text.decode(errors="replace"))
+        elif topic_id == ID_PARAMETER_REQUEST:
+            self._parameter(parameter_request_untrusted(buf, off, n))
+        else:
+            self._strange(topic_id, now)
+
+    def _time(self, now: int) -> None:
+        """Answers with the time at which the request left the board, as the board adds the whole round trip to it."""
+        stamp = self.core.world.time() - _TIME_BYTES * self.output.byte_us * 1000
+        body = bytearray(8)
+        write_time(body, 0, stamp // 1_000_000_000 & 0xFFFFFFFF, stamp % 1_000_000_000)
+        self.output.post(frame(ID_TIME, body, self.version))
+        self.pump(now)
+        last, self.last_time = self.last_time, now
+        if (
+            self.state == SYNCED
+            and not self._open_asks
+            and last is not None
+            and now - last < _TIME_PERIOD
+            and self._settle_at is None
+        ):
+            self.resets += 1
+            self._restart()
+            self.core.tell(BoardReset(self.label))
+            self._told_ready = False
+            self._first_ask = now
+            self._ask(now)
+        elif self._open_asks or self.state != SYNCED:
+            self._answered(now)
+
+    def _named(self, half: int, info: TopicInfo, now: int) -> None:
+        """The board names a topic, or one half of a service."""
+        self._answered_topics(now)
+        if half in (ID_SUBSCRIBER, ID_SERVICE_SERVER + 1, ID_SERVICE_CLIENT + 1):
+            self.input_buffer = max(info.buffer_size, 0)
+        else:
+            self.output_buffer = max(self.output_buffer, info.buffer_size)
+            self.decoder.limit = min(self.core.limits.max_payload, max(self.output_buffer, OVERHEAD))
+        branch = _BRANCHES[half]
+        key = (branch, info.topic_name)
+        infos: tuple[TopicInfo, ...] = (info,)
+        if branch in (ID_SERVICE_SERVER, ID_SERVICE_CLIENT):
+            halves = self._halves.setdefault(key, {})
+            if len(self._halves) > self.core.limits.max_endpoints:
+                del self._halves[key]
+                self._too_many()
+                return
+            halves[half - branch] = info
+            if len(halves) < 2:
+                return
+            infos = (halves[0], halves[1])
+        if self.node is not None:
+            self._set_up(key, infos)
+
+    def _answered_topics(self, now: int) -> None:
+        if self.state != SYNCED or self.node is None:
+            self._answered(now)
+        self._settle_at = now + self.core.limits.settle
+        self.wake(self._settle_at)
+        self._open_asks.clear()
+
+    def _set_up(self, key: tuple[int, str], infos: tuple[TopicInfo, ...]) -> None:
+        says = (infos[0].message_type, *(info.md5sum for info in infos))
+        known = self.endpoints.get(key)
+        if known is not None and known.says == says:
+            for info in known.infos:
+                self._incoming.pop(info.topic_id, None)
+            known.infos = infos
+        else:
+            if known is not None:
+                self._remove(known)
+            elif len(self.endpoints) >= self.core.limits.max_endpoints:
+                self._too_many()
+                return
+            try:
+                known = self._make(key[0], infos)
+            except RefusedError as error:
+                self._refuse(key[0], infos, error)
+                return
+            self.endpoints[key] = known
+            for info in infos[-1:] if len(infos) == 1 else infos:
+                self._said(known, info)
+            self._warn(known)
+        known.round = self._round
+        receive = getattr(known, "receive", None)
+        if receive is not None:
+            self._incoming[infos[0].topic_id] = receive
+
+    def _make(self, branch: int, infos: tuple[TopicInfo, ...]) -> Endpoint:
+        assert self.node is not None
+        info = infos[0]
+        name, kind = info.topic_name, info.message_type
+        if branch == ID_PUBLISHER:
+            return Publication(self, infos, self.node.publisher(name, kind, info.md5sum))
+        if branch == ID_SUBSCRIBER:
+            subscription = Subscription(self, infos)
+            subscription.begin(self.node.subscriber(name, kind, info.md5sum, subscription.on_data))
+            return subscription
+        if branch == ID_SERVICE_SERVER:
+            server = ServiceServer(self, infos)
+            server.begin(self.node.server(name, kind, infos[1].md5sum, info.md5sum, server.on_data))
+            return server
+        client = ServiceClient(self, infos)
+        client.begin(self.node.caller(name, kind, info.md5sum, infos[1].md5sum, client.on_reply))
+        return client
+
+    def _said(self, endpoint: Endpoint, info: TopicInfo) -> None:
+        if info is endpoint.infos[0]:
+            self.core.tell(
+                EndpointSetUp(self.label, endpoint.kind, endpoint.name, endpoint.type_name, info.buffer_size)
+            )
+
+    def _warn(self, endpoint: Endpoint) -> None:
+        """What can be said at once: a definition that differs, messages that cannot fit, or are slow for the line."""
+        shape = endpoint.shape
+        if shape.drift:
+            self.report(
+                "old-definition",
+                subject=endpoint.name,
+                what=f"{endpoint.name} of {self.who} is converted from another definition of {endpoint.type_name}",
+                why=shape.drift,
+                remedy="Nothing; or generate the firmware's message headers anew",
+            )
+        out = isinstance(endpoint, Publication)
+        info = endpoint.infos[0 if out or len(endpoint.infos) == 1 else 1]
+        room = info.buffer_size - OVERHEAD if out else info.buffer_size
+        if shape.least_size > room:
+            buffer = "OUTPUT_SIZE" if out else "INPUT_SIZE"
+            self.report(
+                "buffer-too-small",
+                subject=endpoint.name,
+                what=f"no message on {endpoint.name} fits {self.who}",
+                why=f"a {endpoint.type_name} has {shape.least_size} B at least, and {buffer} is {info.buffer_size} B",
+                remedy=f"Enlarge {buffer} of the board's NodeHandle_",
+            )
+        elif not out:
+            endpoint.warn_slow(shape.least_size)
+
+    def _refuse(self, branch: int, infos: tuple[TopicInfo, ...], error: RefusedError) -> None:
+        """Only that topic is refused; what comes on it is passed over, and no new request is made for its id."""
+        info = infos[0]
+        kind = {0: "publisher", 1: "subscriber", 2: "service server", 4: "service client"}[branch]
+        self.report(
+            "topic-refused",
+            subject=f"{kind} {info.topic_name}",
+            what=f"Creation of {kind} failed: {info.topic_name} [{info.message_type}] of {self.who}",
+            why=error.why,
+            remedy=error.remedy,
+        )
+        if branch != ID_SUBSCRIBER:
+            self._incoming[info.topic_id] = _pass_over
+
+    def _remove(self, endpoint: Endpoint) -> None:
+        for key, each in list(self.endpoints.items()):
+            if each is endpoint:
+                del self.endpoints[key]
+                self._halves.pop(key, None)
+        for info in endpoint.infos:
+            if getattr(self._incoming.get(info.topic_id), "__self__", None) is endpoint:
+                del self._incoming[info.topic_id]
+        endpoint.close()
+
+    def _too_many(self) -> None:
+        self.report(
+            "too-many-topics",
+            what=f"a topic of {self.who} is not set up",
+            why=f"it has {self.core.limits.max_endpoints} already",
+            remedy="Allow more with the limit max_endpoints",
+        )
+
+    def _log(self, level: int, text: str) -> None:
+        self.core.tell(BoardLog(self.label, level, text))
+        if self.node is not None:
+            self.node.log(level, text)
+
+    def _parameter(self, name: str) -> None:
+        """Answers always and at once: without an answer the board's loop would stand still for a second."""
+        value = self.node.parameter(name) if self.node is not None else None
+        if value is None:
+            self.report(
+                "no-such-parameter",
+                subject=name,
+                what=f"{self.who} asks for the parameter {name}",
+                why="it is not set",
+                remedy=f"Set it: muros param set {self.node_name} {plain_name(name, self.node_name)} VALUE",
+            )
+        room = self.input_buffer or self.core.limits.input_buffer
+        body, fits = answer_of(value, room)
+        if not fits:
+            self.report(
+                "too-long-for-board",
+                subject=name,
+                what=f"the parameter {name} is not given to {self.who}",
+                why=f"it does not fit the board's input buffer of {room} B, or is no value that a board can have",
+                remedy="Use numbers, texts or lists of one of them, short enough for INPUT_SIZE",
+            )
+        self.output.post(frame(ID_PARAMETER_REQUEST, body, self.version))
+        self.pump(self._now)
+
+    def _strange(self, topic_id: int, now: int) -> None:
+        """A frame on an id that the board has not named: something was lost, or it began anew with other topics."""
+        self.unknown += 1
+        if topic_id >= ID_FIRST_TOPIC or topic_id > ID_TX_STOP:
+            self.report(
+                "unknown-topic-id",
+                subject=str(topic_id),
+                what=f"{{n}} message{{s}} of {self.who} on topic id {topic_id} passed over",
+                why="the board has not named that topic",
+                remedy="Nothing: the board is asked again",
+            )
+        if now >= self._asked_at + self.core.limits.ask:
+            self._ask(now)
+            self._plan(now)
+
+
+def _pass_over(body: bytes, now: int) -> None:
+    """What comes on a refused topic; the refusal was said."""

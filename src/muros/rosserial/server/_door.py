@@ -1,0 +1,149 @@
+"""The door between boards and the worlds they are in: topics, services, logs and parameters, in ROS 1 bytes.
+
+A board's endpoints hand over and take whole ROS 1 messages, as they are in rosserial frames. A `World` gives each
+board a `Node`; the ROS 2 graph converts there, a ROS 1 graph passes them on. What cannot be made raises
+`RefusedError`, and a body that is not of its type `BodyError`; nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+__all__ = [
+    "BodyError",
+    "Caller",
+    "Node",
+    "Publisher",
+    "RefusedError",
+    "Server",
+    "Shape",
+    "Subscriber",
+    "World",
+]
+
+
+class RefusedError(Exception):
+    """An endpoint cannot be had in this world: why, and what to do."""
+
+    def __init__(self, why: str, remedy: str) -> None:
+        super().__init__(f"{why}. {remedy}")
+        self.why = why
+        self.remedy = remedy
+
+
+class BodyError(Exception):
+    """The bytes are no message of that type; the text says where they are wrong."""
+
+
+class Shape(Protocol):
+    """What is known of the messages of an endpoint."""
+
+    @property
+    def size(self) -> int | None:
+        """Bytes of every message in ROS 1, if they are all of one size."""
+
+    @property
+    def least_size(self) -> int:
+        """Bytes of the shortest message."""
+
+    @property
+    def drift(self) -> str:
+        """How the board's definition differs from the one of this world, in a sentence; empty if it does not."""
+
+
+class Publisher(Shape, Protocol):
+    """Where a board's messages go."""
+
+    def publish(self, body: bytes) -> None:
+        """Gives a message to whoever is there. Raises BodyError."""
+
+    def close(self) -> None:
+        """Takes it out of the world."""
+
+
+class Subscriber(Shape, Protocol):
+    """Where messages for a board wait; the oldest are dropped when they become too many."""
+
+    def take(self) -> bytes | None:
+        """The oldest message, None if there is none. Raises BodyError for one that cannot be converted."""
+
+    def close(self) -> None:
+        """Takes it out of the world."""
+
+
+class Caller(Shape, Protocol):
+    """A service that a board calls. The shape is that of responses."""
+
+    def call(self, body: bytes) -> int:
+        """Sends a request; returns its number, 0 if it could not be sent. Raises BodyError."""
+
+    @property
+    def ready(self) -> bool:
+        """Whether a server is there."""
+
+    def close(self) -> None:
+        """Takes it out of the world."""
+
+
+class Server(Shape, Protocol):
+    """A service that a board serves. The shape is that of requests."""
+
+    def take(self) -> tuple[Any, bytes] | None:
+        """The oldest request with what names it, None if there is none. Raises BodyError."""
+
+    def answer(self, request: Any, body: bytes) -> None:
+        """Answers the request. Raises BodyError."""
+
+    def close(self) -> None:
+        """Takes it out of the world."""
+
+
+class Node(Protocol):
+    """A board in a world. Names are as the board says them: relative, absolute or private.
+
+    ``on_data()`` is called when something comes where nothing was; take until None then.
+    """
+
+    def publisher(self, name: str, type_name: str, md5: str) -> Publisher:
+        """A new publisher. Raises RefusedError."""
+
+    def subscriber(self, name: str, type_name: str, md5: str, on_data: Callable[[], object]) -> Subscriber:
+        """A new subscriber. Raises RefusedError."""
+
+    def caller(
+        self,
+        name: str,
+        type_name: str,
+        request_md5: str,
+        response_md5: str,
+        on_reply: Callable[[int, bytes], object],
+    ) -> Caller:
+        """A new client of a service; ``on_reply(number, body)`` gets the answers. Raises RefusedError."""
+
+    def server(
+        self, name: str, type_name: str, request_md5: str, response_md5: str, on_data: Callable[[], object]
+    ) -> Server:
+        """A new service. Raises RefusedError."""
+
+    def log(self, level: int, text: str) -> None:
+        """The board says something; levels are 0 debug to 4 fatal."""
+
+    def parameter(self, name: str) -> Any:
+        """The value of a parameter: bool, int, float, str, or a list of these; None if it is not set."""
+
+    def diagnose(self, text: str, level: int, values: dict[str, str]) -> None:
+        """How the board is: a sentence, 0 good to 2 bad, and figures."""
+
+    def close(self) -> None:
+        """The board has left this world."""
+
+
+class World(Protocol):
+    """Where boards are."""
+
+    def node(self, name: str, owner: str) -> Node:
+        """A node for a board. ``name`` is full, ``owner`` is whom findings name. Raises RefusedError."""
+
+    def time(self) -> int:
+        """The time of this world, in ns: the wall clock's, or a simulation's."""

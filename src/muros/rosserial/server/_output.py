@@ -1,0 +1,124 @@
+"""What a board is sent, in which order and how fast: what is urgent first, then its topics in turn.
+
+A line whose rate is known is written at most `lead` milliseconds ahead, so that what is urgent never waits behind
+a backlog. Others are written while the system takes it at once. What a line has no room for stays where it is:
+messages in their readers, where newer ones replace older ones.
+"""
+
+from collections import deque
+from collections.abc import Hashable
+from typing import Any, Protocol
+
+__all__ = ["Link", "Output", "Source"]
+
+_POLL = 2
+"""When to look again at a line that takes nothing now, in ms."""
+_BATCH = 2048
+"""Bytes that are handed over at once, so that many small frames cost one call of the system."""
+
+
+class Link(Protocol):
+    """What the server needs of a link."""
+
+    @property
+    def name(self) -> str:
+        """The link in words."""
+
+    def send(self, message: bytes, address: Any) -> bool:
+        """Sends bytes to a peer."""
+
+    def backlog(self, address: Any) -> int:
+        """Bytes that wait for a peer in this program."""
+
+
+class Source(Protocol):
+    """A topic that a board reads."""
+
+    def next(self, now: int) -> bytes | None:
+        """The next frame for the board, None if there is none now."""
+
+
+class Output:
+    """The way to one board. ``byte_us``: microseconds that a byte takes on the line, 0 if unknown; ``lead`` in ms.
+
+    Counters: ``frames`` and ``bytes`` sent, ``dropped`` frames that found no room.
+    """
+
+    def __init__(self, link: Link, address: Hashable, byte_us: int, lead: int, room: int) -> None:
+        self.link = link
+        self.address = address
+        self.byte_us = byte_us
+        self.frames = 0
+        self.bytes = 0
+        self.dropped = 0
+        self.holds = True
+        """Whether topics have to wait: the board is not in sync."""
+        self._lead_us = 1000 * lead
+        self._room = room
+        self._urgent: deque[bytes] = deque()
+        self._ready: deque[Source] = deque()
+        self._free_us = 0
+
+    def post(self, frame: bytes) -> bool:
+        """Has a frame sent before all topics; False if too many wait."""
+        if len(self._urgent) >= self._room:
+            self.dropped += 1
+            return False
+        self._urgent.append(frame)
+        return True
+
+    def add(self, source: Source) -> None:
+        """A topic has something; it is asked for it until it has nothing."""
+        self._ready.append(source)
+
+    def remove(self, source: Source) -> None:
+        """A topic is gone."""
+        if source in self._ready:
+            self._ready.remove(source)
+
+    def clear(self) -> None:
+        """Forgets what is urgent: the line is gone."""
+        self._urgent.clear()
+        self._free_us = 0
+
+    def pump(self, now: int) -> int | None:
+        """Sends what can be sent at ``now``; returns when to call again if something is left."""
+        urgent, ready = self._urgent, self._ready
+        now_us = 1000 * now
+        while urgent or (ready and not self.holds):
+            if self._free_us > now_us + self._lead_us:
+                return now + max(1, (self._free_us - now_us - self._lead_us) // 1000)
+            if self.link.backlog(self.address):
+                return now + _POLL
+            batch, n = self._batch(now, now_us)
+            if not batch:
+                return None
+            self._free_us = max(self._free_us, now_us) + n * self.byte_us
+            if self.link.send(batch[0] if len(batch) == 1 else b"".join(batch), self.address):
+                self.frames += len(batch)
+                self.bytes += n
+            else:
+                self.dropped += len(batch)
+        return None
+
+    def _batch(self, now: int, now_us: int) -> tuple[list[bytes], int]:
+        """The next frames to send, and their bytes: as many as are worth one call, and the line is free for."""
+        urgent, ready = self._urgent, self._ready
+        batch: list[bytes] = []
+        n = 0
+        free_us = max(self._free_us, now_us)
+        while n < _BATCH and free_us + n * self.byte_us <= now_us + self._lead_us:
+            if urgent:
+                frame: bytes | None = urgent.popleft()
+            elif ready and not self.holds:
+                source = ready.popleft()
+                frame = source.next(now)
+                if frame is None:
+                    continue
+                ready.append(source)
+            else:
+                break
+            assert frame is not None
+            batch.append(frame)
+            n += len(frame)
+        return batch, n

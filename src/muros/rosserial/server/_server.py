@@ -1,0 +1,269 @@
+"""The rosserial server in an asyncio program: its core, its lines and one timer.
+
+server = Server("dds:")
+server.add_serial("/dev/ttyACM0", 57600)
+server.add_tcp(11411)
+server.on_event(lambda event: print(event.text()))
+server.on_finding(lambda finding: print(finding.format()))
+await server.run()
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+from muros.findings import Finding, Findings
+from muros.links import Link
+from muros.rosserial.server._core import ServerCore
+from muros.rosserial.server._limits import Limits
+from muros.rosserial.server._lines import BAUD, TCP_PORT, identify, serial_line, tcp_line
+from muros.rosserial.server._space_world import SpaceWorld
+from muros.rosserial.server.events import Event, LineDown
+from muros.space import Space, open_space
+
+__all__ = ["NODE_NAME", "Server"]
+
+NODE_NAME = "/serial_node"
+"""What boards are called when nothing else is said, as the node of the ROS 1 servers was."""
+
+_NS_PER_MS = 1_000_000
+_GOODBYE_S = 0.05
+"""How long lines are kept open for the last frames to leave."""
+
+
+class Server:
+    """A rosserial server. Everything it does happens on the thread of the loop that runs it.
+
+    ``space``: a URL (``"dds:"``, the ROS 2 graph; ``"local:"``, only this process) or a space to share with others.
+    ``remap`` gives topics and services other names. ``parameters(node)`` gives the first parameters of the node with
+    that full name. ``limits`` are those of the server; single ``fields`` of `Limits` may be given by name instead.
+    """
+
+    def __init__(
+        self,
+        space: str | Space = "dds:",
+        *,
+        findings: Findings | None = None,
+        domain: int | None = None,
+        remap: Mapping[str, str] | None = None,
+        parameters: Callable[[str], Mapping[str, Any]] | None = None,
+        limits: Limits | None = None,
+        **fields: Any,
+    ) -> None:
+        if isinstance(space, str):
+            self.findings = findings or Findings()
+            self.space = open_space(space, findings=self.findings)
+            self._owns_space = True
+        else:
+            self.findings = findings or space.findings
+            self.space = space
+            self._owns_space = False
+        made = replace(limits or Limits(), **fields)
+        self._world = SpaceWorld(
+            self.space,
+            wall=time.time_ns,
+            later=self._later,
+            remap=remap,
+            parameters=parameters,
+            depth=made.depth,
+            domain=domain,
+        )
+        self.core = ServerCore(self._world, self.findings, limits=made, wall=time.time_ns, clock=_now)
+        self.core.on_event = self._tell
+        self.core.on_wake = self._arm
+        self.links: list[Link] = []
+        self._adapters: dict[Link, _LinkAdapter] = {}
+        self._watchers: list[Callable[[Event], object]] = []
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._timer_at = 0
+        self._ticking = False
+        self._closed: asyncio.Event | None = None
+        self._ended = False
+
+    def add_serial(self, devices: str | Sequence[str], baud: int = BAUD, *, name: str | None = None) -> Link:
+        """Adds serial ports, by path, by-id name or pattern; see `add_link`."""
+        return self.add_link(serial_line(devices, baud), name=name)
+
+    def add_tcp(self, port: int = TCP_PORT, host: str | None = None, *, name: str | None = None) -> Link:
+        """Adds a port where boards dial in; see `add_link`."""
+        return self.add_link(tcp_line(port, host), name=name)
+
+    def add_link(self, link: Link, *, name: str | None = None) -> Link:
+        """Adds a link without framing (`RawFraming`); it opens when the server runs, or now if it does.
+
+        ``name`` is the full name of the board's node; without one boards are called after their lines. Raises
+        LinkError if it cannot open now.
+        """
+        adapter = _LinkAdapter(self, link, name)
+        link.on_peer = adapter.on_peer
+        if self._loop is not None:
+            link.open(adapter)
+        self.links.append(link)
+        self._adapters[link] = adapter
+        return link
+
+    def remove_link(self, link: Link) -> None:
+        """Closes a link; its boards count as lost."""
+        self.links.remove(link)
+        adapter = self._adapters.pop(link)
+        for board in adapter.port.boards.values():
+            board.stop()
+        link.close()
+        for address in list(adapter.port.boards):
+            adapter.port.down(address, "its link was removed", _now())
+
+    def on_event(self, callback: Callable[[Event], object]) -> Callable[[], None]:
+        """Calls ``callback`` with every event from now on; returns a function that ends it."""
+        self._watchers.append(callback)
+        return lambda: self._watchers.remove(callback)
+
+    def on_finding(self, callback: Callable[[Finding], object]) -> Callable[[], None]:
+        """Calls ``callback`` with every new finding and with summaries; returns a function that ends it."""
+        return self.findings.on_finding(callback)
+
+    async def start(self) -> None:
+        """Opens the lines and serves in the background. Raises LinkError; no line is open then, and one may try again.
+
+        Raises RuntimeError for a server that serves already or was closed: make a new one.
+        """
+        if self._loop is not None or self._ended:
+            raise RuntimeError(
+                "this server was closed: make a new one" if self._ended else "this server runs already"
+            )
+        self._loop = asyncio.get_running_loop()
+        self._closed = asyncio.Event()
+        try:
+            self.space.attach(self._loop)
+            for link in self.links:
+                link.open(self._adapters[link])
+        except BaseException:
+            self._stop()
+            raise
+        self._arm(_now())
+
+    async def run(self) -> None:
+        """Opens the lines and serves until `close` is called or the task is cancelled. Raises LinkError."""
+        await self.start()
+        assert self._closed is not None
+        try:
+            await self._closed.wait()
+        finally:
+            await self.stop()
+
+    async def stop(self) -> None:
+        """Tells every board that nobody listens any more, waits until that has left, and closes."""
+        if not self._ended and self._loop is not None:
+            self.core.stop()
+            with suppress(asyncio.CancelledError):
+                await asyncio.sleep(_GOODBYE_S)
+        self.close()
+
+    def close(self) -> None:
+        """Closes every line and removes every board, for good. Closing twice is harmless."""
+        if self._ended:
+            return
+        self._ended = True
+        self.core.stop()
+        self._stop()
+        for board in list(self.core.boards):
+            self.core.remove(board, "the server stops")
+        self._world.close()
+        self.findings.flush()
+        if self._owns_space:
+            self.space.close()
+        if self._closed is not None:
+            self._closed.set()
+
+    def _stop(self) -> None:
+        self._loop = None
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        for link in self.links:
+            link.close()
+
+    def _later(self, call: Callable[[], object]) -> None:
+        if self._loop is not None:
+            self._loop.call_soon(call)
+
+    def _tell(self, event: Event) -> None:
+        for callback in list(self._watchers):
+            try:
+                callback(event)
+            except Exception as error:  # whoever watches must not harm those who are watched
+                self.core.report(
+                    "watcher-failed",
+                    who=getattr(callback, "__qualname__", repr(callback)),
+                    what="{n} event{s} not taken by a watcher of the server",
+                    why=f"it raised {type(error).__name__}: {error}",
+                    remedy="Mend the callback given to on_event.",
+                )
+
+    def _arm(self, tick: int) -> None:
+        """Sees to a call of `_tick` at ``tick`` (ms) at the latest."""
+        if self._loop is None or self._ticking or (self._timer is not None and self._timer_at <= tick):
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer_at = tick
+        self._timer = self._loop.call_later(max(0, tick - _now()) / 1000, self._tick)
+
+    def _tick(self) -> None:
+        self._timer = None
+        self._ticking = True  # what wants to be called is asked for at the end
+        try:
+            now = _now()
+            due = self.core.tick(now)
+        finally:
+            self._ticking = False
+        waits = [] if due is None else [due]
+        seconds = time.time()
+        findings_due = self.findings.tick(seconds)
+        if findings_due is not None:
+            waits.append(now + max(0, int((findings_due - seconds) * 1000)) + 1)
+        if waits:
+            self._arm(min(waits))
+
+
+class _LinkAdapter:
+    """What one link tells the server: the events of a link, turned into calls of the core."""
+
+    def __init__(self, server: Server, link: Link, name: str | None) -> None:
+        self._server = server
+        self._link = link
+        alone = name is not None
+        full = "/" + (name or NODE_NAME).strip("/")
+        self.port = server.core.attach(link, lambda address: identify(link, address, full, alone))
+
+    def on_peer(self, address: Hashable) -> None:
+        """Somebody can be spoken to."""
+        self.port.up(address, _now())
+
+    def on_message(self, link: Link, data: bytes, address: Hashable) -> None:
+        """Bytes came."""
+        self.port.receive(data, address, time.monotonic_ns() // _NS_PER_MS)
+
+    def on_up(self, link: Link, detail: str) -> None:
+        """The link or a port of it has become usable: `on_peer` says who is there."""
+
+    def on_down(self, link: Link, reason: str) -> None:
+        """The link or a port of it has gone."""
+        self._server._tell(LineDown(link.name, reason))
+
+    def on_gone(self, link: Link, address: Hashable, reason: str) -> None:
+        """A peer cannot be reached any more."""
+        self.port.down(address, reason, _now())
+
+    def on_problem(self, link: Link, code: str, what: str, why: str, remedy: str, n: int) -> None:
+        """Something was dropped, refused or does not work."""
+        self._server.core.report(code, who=link.name, what=what, why=why, remedy=remedy, n=n)
+
+
+def _now() -> int:
+    return time.monotonic_ns() // _NS_PER_MS

@@ -1,0 +1,166 @@
+"""What happens at a rosserial server, as values: who came, who left, what was set up. ``text()`` says it for people.
+
+What went wrong is not an event but a finding.
+"""
+
+from dataclasses import dataclass
+
+__all__ = [
+    "BoardBack",
+    "BoardGone",
+    "BoardHeard",
+    "BoardLog",
+    "BoardLost",
+    "BoardReady",
+    "BoardReset",
+    "EndpointSetUp",
+    "Event",
+    "LineDown",
+    "LineUp",
+]
+
+LEVELS = ("DEBUG", "INFO", "WARN", "ERROR", "FATAL")
+"""The levels of logs, by their numbers."""
+
+_VERSIONS = {0xFE: "hydro or later", 0xFF: "groovy or earlier"}
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened to ``board``, which is named by its line."""
+
+    board: str
+
+    def text(self) -> str:
+        """One line for people."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True)
+class LineUp(Event):
+    """A line can be used: a port was opened, or a connection came. The server asks for topics."""
+
+    def text(self) -> str:
+        """One line for people."""
+        return f"{self.board} is up. Requesting topics..."
+
+
+@dataclass(frozen=True, slots=True)
+class LineDown(Event):
+    """A line or a whole link is gone; the server waits for it."""
+
+    reason: str
+
+    def text(self) -> str:
+        """One line for people."""
+        return self.reason or f"{self.board} is down"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardHeard(Event):
+    """The first good frame of a board; ``version`` is the second byte of its frames."""
+
+    version: int
+
+    def text(self) -> str:
+        """One line for people."""
+        return f"board {self.board} speaks rosserial ({_VERSIONS.get(self.version, hex(self.version))})"
+
+
+@dataclass(frozen=True, slots=True)
+class EndpointSetUp(Event):
+    """A board's topic or service is in the graph. The texts are those that rosserial users know."""
+
+    kind: str
+    """``publisher``, ``subscriber``, ``service server`` or ``service client``."""
+    name: str
+    type_name: str
+    buffer_size: int
+
+    def text(self) -> str:
+        """One line for people."""
+        return f"Setup {self.kind} on {self.name} [{self.type_name}]"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardReady(Event):
+    """A board has said what it has, and nothing more for a while."""
+
+    node: str
+    publishers: int
+    subscribers: int
+    servers: int
+    clients: int
+    seconds: float
+    """Since it was asked first."""
+
+    def text(self) -> str:
+        """One line for people."""
+        parts = [
+            f"{count} {name}{'' if count == 1 else 's'}"
+            for count, name in (
+                (self.publishers, "publisher"),
+                (self.subscribers, "subscriber"),
+                (self.servers, "service"),
+                (self.clients, "service client"),
+            )
+            if count
+        ]
+        return f"board {self.board}: node {self.node}: {', '.join(parts) or 'no topics'}"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardReset(Event):
+    """A board has started again, or believes itself unconnected; it was asked for its topics anew."""
+
+    def text(self) -> str:
+        """One line for people."""
+        return f"board {self.board} started again. Requesting topics..."
+
+
+@dataclass(frozen=True, slots=True)
+class BoardLost(Event):
+    """A board is silent or its line is gone; its endpoints stay for ``kept`` seconds."""
+
+    reason: str
+    kept: float
+
+    def text(self) -> str:
+        """One line for people."""
+        return f"Lost sync with device: board {self.board} ({self.reason}), kept for {self.kept:.0f} s"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardBack(Event):
+    """A lost board is heard again; ``away`` is in seconds."""
+
+    away: float
+
+    def text(self) -> str:
+        """One line for people."""
+        return f"board {self.board} back after {self.away:.1f} s"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardGone(Event):
+    """A board and its endpoints were removed."""
+
+    reason: str
+
+    def text(self) -> str:
+        """One line for people."""
+        return f"board {self.board} gone: {self.reason}"
+
+
+@dataclass(frozen=True, slots=True)
+class BoardLog(Event):
+    """A board says something; ``level`` is 0 debug to 4 fatal."""
+
+    level: int
+    message: str
+
+    def text(self) -> str:
+        """One line for people."""
+        level = LEVELS[self.level] if self.level < len(LEVELS) else str(self.level)
+        shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in self.message)
+        return f"[{level}] {self.board}: {shown}"
