@@ -37,6 +37,7 @@ ELSEWHERE = {
     "muros/client/tcp.py": frozenset({"socket"}),
     "muros/client/serial.py": frozenset({"os", "termios"}),
     "muros/client/uart.py": frozenset({"machine"}),
+    "muros/rosserial/uart.py": frozenset({"machine"}),
 }
 """What single modules may import besides: the platform in ``compat``, native code, and the transports."""
 

@@ -49,6 +49,7 @@ HOST_ONLY = frozenset(
         "muros/rclc/parameter_files.py",
         "muros/rclc/remapping.py",
         "muros/rosserial/constants.py",
+        "muros/rosserial/types.py",
         "muros/rosserial/server/__init__.py",
         "muros/rosserial/server/_board.py",
         "muros/rosserial/server/_core.py",

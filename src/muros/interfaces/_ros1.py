@@ -129,12 +129,11 @@ def ros1_name(ros2_type: str) -> str:
     raise InterfaceError(f"{ros2_type!r} is no full type name: it looks like std_msgs/msg/Byte")
 
 
-def ros1_message_definition(home: Registry, ros1_type: str) -> Message:
-    """The definition of a message or half a service in ROS 1; :class:`InterfaceError` if there is none."""
-    name = ros2_message(ros1_type)
-    if ros1_type in ("std_msgs/Time", "std_msgs/Duration"):
-        return Message(f"std_msgs/msg/{name.rpartition('/')[2]}", (Field("data", FieldType(name, True)),))
-    return home.ros1_message(name) or home.message(name)
+def ros1_definition(ros1_type: str, distro: str | None = None) -> tuple[Message, str]:
+    """The definition of a message or half a service in ROS 1, and its md5 sum; :class:`InterfaceError` if none."""
+    home = _api.registry(distro)
+    found = _definition(home, ros1_type)
+    return found, _hashes.ros1_message_md5(home, found)
 
 
 # ---- making one ----
@@ -142,7 +141,7 @@ def ros1_message_definition(home: Registry, ros1_type: str) -> Message:
 
 def _convert(home: Registry, ros1_type: str, md5: str | None) -> Converter:
     name = ros2_message(ros1_type)
-    theirs, ours = ros1_message_definition(home, ros1_type), home.message(name)
+    theirs, ours = _definition(home, ros1_type), home.message(name)
     known = _hashes.ros1_message_md5(home, theirs)
     if md5 is None or md5 == known:
         drift = ""
@@ -173,6 +172,13 @@ def _convert(home: Registry, ros1_type: str, md5: str | None) -> Converter:
         _ros1_code.compiled(ros1_type, down),
         up + "\n\n" + down,
     )
+
+
+def _definition(home: Registry, ros1_type: str) -> Message:
+    name = ros2_message(ros1_type)
+    if ros1_type in ("std_msgs/Time", "std_msgs/Duration"):
+        return Message(f"std_msgs/msg/{name.rpartition('/')[2]}", (Field("data", FieldType(name, True)),))
+    return home.ros1_message(name) or home.message(name)
 
 
 def _half(ros1_type: str) -> tuple[str, str]:
