@@ -14,8 +14,9 @@ PATIENCE = 10.0
 class RunningAgent:
     """An agent on a thread of its own, with one link."""
 
-    def __init__(self, *links: Link, **options: Any) -> None:
+    def __init__(self, *links: Link, space: str = "local:", **options: Any) -> None:
         self.links = links
+        self._space = space
         self.failure: BaseException | None = None
         self._up = threading.Event()
         self._options = options
@@ -27,7 +28,7 @@ class RunningAgent:
 
     async def _main(self) -> None:
         self._loop = asyncio.get_running_loop()
-        self._agent = Agent("local:", **self._options)
+        self._agent = Agent(self._space, **self._options)
         for link in self.links:
             self._agent.add_link(link)
         try:

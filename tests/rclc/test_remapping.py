@@ -49,7 +49,6 @@ def node(rules: str = "", name: str = "arm", namespace: str = "/", **options: An
         ("-r arm:chatter:=talk", "/", "chatter", "/talk"),
         ("-r rostopic://chatter:=talk", "/", "chatter", "/talk"),
         ("-r rosservice://chatter:=talk", "/", "chatter", "/chatter"),
-        ("-r chatter:={node}/talk", "/", "chatter", "/arm/talk"),
         ("-r __node:=leg -r leg:chatter:=talk", "/", "chatter", "/talk"),
         ("-r __ns:=/lab -r chatter:=talk", "/", "chatter", "/lab/talk"),
     ],
@@ -95,10 +94,10 @@ def test_rules_of_a_node_go_before_those_of_the_program() -> None:
 
 
 def test_a_rule_that_leads_nowhere_is_told_where_the_name_is_used() -> None:
-    made = node("-r chatter:=~")
+    made = node("-r chatter:=~/talk")
     with pytest.raises(ArgumentsError):
-        node("-r chatter:=")
-    assert made.resolve_topic("chatter") == "/arm"
+        node("-r chatter:=~")
+    assert made.resolve_topic("chatter") == "/arm/talk"
     with pytest.raises(InvalidNameError):
         made.resolve_topic("no name")
 
@@ -159,6 +158,7 @@ def test_switches() -> None:
         ("-r a//b:=c", 1001, "both sides are names"),
         ("-r a:=1b", 1001, "both sides are names"),
         ("-r /**:=b", 1001, "both sides are names"),
+        ("-r a:={node}", 1001, "both sides are names"),
         ("-r rosservice://a:=rostopic://b", 1001, "both sides are names"),
         ("-r __node:=a/b", 1001, "'a/b' cannot be the name of a node"),
         ("-r __ns:=lab", 1001, "'lab' cannot be a namespace, which reads like /lab"),

@@ -85,7 +85,7 @@ def by_node(text: str, file: str = "the file") -> list[tuple[str, dict[str, Any]
     """
     yaml = import_module("yaml")
     try:
-        found = yaml.safe_load(text)
+        found = _load(yaml, text)
     except yaml.YAMLError as error:
         raise InvalidParameterError(f"{file} is no YAML: {' '.join(str(error).split())}") from None
     if not isinstance(found, dict):
@@ -129,6 +129,17 @@ def fitting(value: Any, known: int) -> Any:
     if known == _BYTES and isinstance(value, list) and all(type(n) is int and 0 <= n < 256 for n in value):
         return bytes(value)
     return value
+
+
+def _load(yaml: Any, text: str) -> Any:
+    """The content of YAML. Names are texts as they are written: ``on`` and ``1`` too, which YAML takes for values."""
+
+    class Loader(yaml.SafeLoader):  # type: ignore[misc]
+        def construct_mapping(self, node: Any, deep: bool = False) -> dict[str, Any]:
+            self.flatten_mapping(node)
+            return {str(key.value): self.construct_object(value, deep=True) for key, value in node.value}
+
+    return yaml.load(text, Loader)
 
 
 def _nodes(tree: Mapping[Any, Any], file: str, path: str = "") -> dict[str, Mapping[Any, Any]]:

@@ -33,9 +33,7 @@ _SWITCHES = ("rosout-logs", "stdout-logs", "external-lib-logs")
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
 _NODE = re.compile(rf"{_TOKEN}\Z")
 _NAMESPACE = re.compile(rf"(/|(/{_TOKEN})+)\Z")
-_NAME = re.compile(
-    rf"(~(?=/)|~\Z)?/?({_TOKEN}|\{{(node|namespace|ns)\}})?(/({_TOKEN}|\{{(node|namespace|ns)\}}))*\Z"
-)
+_NAME = re.compile(rf"(~?/)?{_TOKEN}(/{_TOKEN})*\Z")
 _PREFIX = re.compile(rf"({_TOKEN}):(?!=|//)(.*)\Z", re.DOTALL)
 
 
@@ -258,7 +256,7 @@ def _scheme(name: str) -> tuple[str, str]:
 
 
 def _is_name(name: str) -> bool:
-    return bool(name) and name != "/" and _NAME.match(name) is not None
+    return _NAME.match(name) is not None
 
 
 def _parameter(text: str) -> tuple[str, Mapping[str, Any]]:
