@@ -2,11 +2,12 @@
 
 Items are whole submessages in the order in which they leave. The first of them that does not fit a message is cut
 into fragments as acknowledgements make room; its bytes are kept until the last fragment is acknowledged, so that it
-can be sent again whole. When a session begins anew, ``hold`` takes over every WRITE_DATA that the agent has not
-acknowledged (DDS-XRCE 1.0, 8.4.10 to 8.4.14). Boards borrow this for as long as there is a backlog.
+can be sent again whole; those of a streamed sample the program gives again, see ``pieces``. When a session begins
+anew, ``hold`` takes over every WRITE_DATA that the agent has not acknowledged (DDS-XRCE 1.0, 8.4.10 to 8.4.14). Boards
+borrow this for as long as there is a backlog.
 """
 
-from muros.compat import const
+from muros.compat import borrow, const
 from muros.xrce.fragments import Cutter
 from muros.xrce.requests import head
 
@@ -38,10 +39,10 @@ class Backlog:
 
     def __init__(self, session: "Session") -> None:
         self.session = session
-        self.items: "list[bytes | bytearray]" = []
+        self.items: "list[Any]" = []  # bytes, or Pieces
         self.cutter: "Cutter | None" = None
-        self._cut: "bytes | bytearray | None" = None  # in fragments, the last one not acknowledged
-        self._held: "list[bytes | bytearray]" = []
+        self._cut: "Any" = None  # in fragments, the last one not acknowledged
+        self._held: "list[Any]" = []
 
     def defer(self, writer: "Any", message: "Outgoing", n: int) -> bool:
         """Sends a sample of ``n`` bytes if it can go out now, else queues it, or counts and reports it."""
@@ -65,8 +66,11 @@ class Backlog:
             return self._refuse(_FULL, _PROBLEM_FULL, writer, n)
         if waiting >= (session.queue or (1 if large or self._cut else 0)):
             return self._refuse(_FULL, _PROBLEM_FULL, writer, n)
-        data = bytearray(2 * _HEAD + n)
-        self._write(data, 0, writer, message, n)
+        if large and hasattr(message, "piece"):
+            data: "Any" = borrow("muros.client.pieces").make(session, writer, message, n)
+        else:
+            data = bytearray(2 * _HEAD + n)
+            self._write(data, 0, writer, message, n)
         self.items.append(data)
         self.pump()
         return True
@@ -87,7 +91,9 @@ class Backlog:
         if self._cut is not None and self.cutter is None:
             if stream.first != stream.next:
                 return
-            self._cut = None
+            data, self._cut = self._cut, None
+            if hasattr(data, "end"):
+                data.end(True)
         while items:
             data = items[0]
             if self.cutter is None:
@@ -96,7 +102,7 @@ class Backlog:
                 n = len(data) - _HEAD
                 if n > stream.mtu - stream._start - _HEAD:
                     self._cut = data
-                    self.cutter = Cutter(data)
+                    self.cutter = data.cutter() if hasattr(data, "end") else Cutter(data)
                 else:
                     at = stream.place(n)
                     if at < 0:
@@ -116,7 +122,7 @@ class Backlog:
 
     def hold(self) -> None:
         """Takes over what the agent has not acknowledged, before the streams begin again."""
-        held: "list[bytes | bytearray]" = []
+        held: "list[Any]" = []
         self._held = held
         stream = self.session.reliable
         stream.transmit(stream.first, stream.next, self._take)

@@ -1,7 +1,7 @@
 """The end of a session: it takes leave of its agent. Boards borrow this."""
 
 from muros.client.link import WAITING, enter
-from muros.compat import const
+from muros.compat import borrow, const
 from muros.xrce.requests import head
 
 TYPE_CHECKING = const(0)
@@ -46,6 +46,8 @@ def close(session: "Session") -> None:
     session.login = True
     session.lead()
     enter(session, WAITING)
+    if session.backlog is not None:
+        borrow("muros.client.pieces").close(session.backlog)
 
 
 class Closed:

@@ -101,12 +101,16 @@ class Cutter:
             at = stream.place(n)
             if at < 0:
                 return False
+            self.put(stream.buf, at + _HEAD, n)
             stream.commit(at, n)
             buf = stream.buf
             buf[at] = _FRAGMENT
             buf[at + 1] = _LITTLE_ENDIAN if self.done + n < total else _LITTLE_ENDIAN | _LAST_FRAGMENT
             buf[at + 2] = n & 255
             buf[at + 3] = n >> 8
-            copy(buf, at + _HEAD, self.data, self.done, n)
             self.done += n
         return True
+
+    def put(self, buf: bytearray, off: int, n: int) -> None:
+        """Writes the next ``n`` bytes."""
+        copy(buf, off, self.data, self.done, n)
