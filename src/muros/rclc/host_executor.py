@@ -25,8 +25,7 @@ from muros.rclc.handle_error import HandleError
 from muros.rclc.host_async import wait_async
 from muros.rclc.host_checks import WrongTypeError, WrongValueError, be_callable
 from muros.rclc.host_handles import describe, tell_problem, ticks
-from muros.rclc.host_let import HostLet
-from muros.rclc.let import Task
+from muros.rclc.host_let import HostLet, HostTask
 from muros.rclc.overruns import GO_ON, LOW_PRIORITY
 from muros.rclc.semantics import ALWAYS, LET, ON_NEW_DATA, RCLCPP
 
@@ -68,7 +67,7 @@ class Executor(executor_.Executor):
         on_error: OnError | int | None = None,
         overrun: int = GO_ON,
         messages: int = 10,
-        on_overrun: Callable[[Task, float], object] | None = None,
+        on_overrun: Callable[[HostTask, float], object] | None = None,
     ) -> None:
         if not isinstance(context, context_.Context):
             raise WrongTypeError(f"Executor needs a context, not {context!r}")
@@ -150,7 +149,7 @@ class Executor(executor_.Executor):
             self.let.drop(handle)
 
     @property
-    def tasks(self) -> list[Task]:
+    def tasks(self) -> list[HostTask]:
         """With LET: what is known of each handle, in the order of adding."""
         return [] if self.let is None else [self.let.task(handle) for handle in self.handles]
 
@@ -323,10 +322,14 @@ class Executor(executor_.Executor):
 
     def _periods(self, period: float) -> Steps[None]:
         self.due = None
-        while self._going():
-            yield from self._one_period(period)
-            yield 0.0
-        self.stopped = False
+        try:
+            while self._going():
+                yield from self._one_period(period)
+                yield 0.0
+            self.stopped = False
+        finally:
+            if self.let is not None:
+                self.let.close()
 
     def _one_period(self, period: float) -> Steps[None]:
         clock = self.context.clock

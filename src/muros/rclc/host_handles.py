@@ -143,6 +143,7 @@ def describe(handle: Any) -> str:
     """Whose callback it is: "on_laser, the callback of subscription 'laser'"."""
     callback = getattr(handle, "callback", None)
     called = getattr(callback, "__qualname__", None) or type(callback).__qualname__
+    called = called.rpartition("<locals>.")[2]
     name = getattr(handle, "topic", None) or getattr(handle, "name", None)
     what = type(handle).__name__.lower()
     if what == "timer":

@@ -125,7 +125,7 @@ class HostLet(Let):
         """Tells of an overrun: `on_overrun` each time, `on_problem` the 1st, 2nd, 4th, 8th... time."""
         executor = self.executor
         if executor.on_overrun is not None:
-            executor.on_overrun(task, late / 1000)
+            executor.on_overrun(self.task(task.handle), late / 1000)
         if task.overruns & (task.overruns - 1) == 0:
             tell_problem(
                 executor.context,
@@ -182,15 +182,17 @@ class HostLet(Let):
     def _replace(self) -> None:
         """Has a worker that is late go on with low priority, and another one do what it has not begun."""
         worker = self._worker
-        if worker is None or worker.current is None or worker.current.result != "OVERRUN":
+        task = None if worker is None else worker.current
+        if worker is None or task is None or task.result != "OVERRUN":
             return
         self._worker = None
         while True:
             try:
-                task = worker.tasks.get_nowait()
+                waiting = worker.tasks.get_nowait()
             except queue.Empty:
                 break
-            self._queue.append(task)  # type: ignore[arg-type]  # None is put by end() alone
+            if waiting is not None:
+                self._queue.append(waiting)
         worker.end()
         worker.lower()
         self._hand_on()

@@ -1,0 +1,649 @@
+"""Logical execution time: inputs at the start of a period, outputs at its end, and what follows when one is late."""
+
+import random
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from muros.rclc import (
+    ALWAYS,
+    CANCEL_CURRENT,
+    CANCEL_NEXT,
+    CANCEL_WITHOUT_OUTPUT,
+    GO_ON,
+    LET,
+    LOW_PRIORITY,
+    RCLCPP,
+    CapacityError,
+    Executor,
+    GuardCondition,
+    always,
+    one,
+)
+from muros.rclc.let import OVERRUN, Task
+from muros.space import Topic
+from tests.rclc.virtual import WAYS, Bench, InSpace
+
+from example_interfaces.srv import AddTwoInts
+from std_msgs.msg import Int32
+
+PERIOD = 10
+"""Milliseconds."""
+
+
+@pytest.fixture(params=WAYS)
+def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    """Two contexts, on each of the ways."""
+    made = WAYS[request.param]()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def local() -> Iterator[InSpace]:
+    """Two contexts in a space."""
+    made = InSpace()
+    yield made
+    made.close()
+
+
+class Heard:
+    """What leaves on topics of a space, and when: (ms since the start, topic, bytes)."""
+
+    def __init__(self, bench: InSpace, *topics: str) -> None:
+        self.bench = bench
+        self.start = bench.now
+        self.all: list[tuple[int, str, bytes]] = []
+        self._participant = bench._space.participant("observer")
+        for topic in topics:
+            self._participant.reader(
+                Topic(f"rt/{topic}", "std_msgs::msg::dds_::Int32_"), on_data=self._taker(topic)
+            )
+
+    def values(self) -> list[tuple[int, str, int]]:
+        """The same with numbers."""
+        return [(at, topic, int.from_bytes(data, "little", signed=True)) for at, topic, data in self.all]
+
+    def _taker(self, topic: str) -> Callable[[Any], None]:
+        def take(reader: Any) -> None:
+            while (sample := reader.take()) is not None:
+                self.all.append((self.bench.now - self.start, topic, bytes(sample.data)))
+
+        return take
+
+
+class Plan:
+    """An executor with LET whose timers, in the order given, each take so many ms and publish the time."""
+
+    def __init__(self, local: InSpace, *durations: int, lets: tuple[float, ...] = (), **options: Any) -> None:
+        self.local = local
+        self.durations = list(durations)
+        self.heard = Heard(local, *[f"out_{i}" for i in range(len(durations))])
+        self.calls: list[tuple[int, int]] = []
+        node = local.context.node("node")
+        self.executor = local.executor(semantics=LET, period=PERIOD / 1000, **options)
+        self.publishers = [node.publisher(Int32, f"out_{i}") for i in range(len(durations))]
+        for i in range(len(durations)):
+            self.executor.add(node.timer(0, self._caller(i)), let=lets[i] if lets else 0)
+
+    def run(self, periods: int) -> None:
+        """So many periods."""
+        for _ in range(periods):
+            self.executor.spin_one_period()
+
+    def _caller(self, i: int) -> Callable[[], None]:
+        def call() -> None:
+            at = self.local.now - self.heard.start
+            self.calls.append((at, i))
+            self.publishers[i].publish(Int32(data=at))
+            self.local.take(self.durations[i])
+
+        return call
+
+
+def test_outputs_leave_at_the_end_of_the_period_in_the_order_of_adding(local: InSpace) -> None:
+    plan = Plan(local, 2, 3, 1)
+    plan.run(2)
+    assert plan.calls == [(0, 0), (2, 1), (5, 2), (10, 0), (12, 1), (15, 2)]
+    assert plan.heard.values() == [
+        (10, "out_0", 0), (10, "out_1", 2), (10, "out_2", 5),
+        (20, "out_0", 10), (20, "out_1", 12), (20, "out_2", 15),
+    ]  # fmt: skip
+    assert plan.executor.overruns == 0
+    assert [task.state for task in plan.executor.tasks] == ["INACTIVE"] * 3
+
+
+def test_inputs_are_those_of_the_start(local: InSpace) -> None:
+    """What comes while callbacks run, or between two periods, waits for the next start."""
+    publisher = local.talker.node("talker").publisher(Int32, "in")
+    node = local.context.node("node")
+    got: list[tuple[int, int]] = []
+    executor = local.executor(semantics=LET, period=0.01)
+    executor.add(
+        node.timer(0, lambda: publisher.publish(Int32(data=7)) and local.context.middleware.spin_once())
+    )
+    executor.add(node.subscription(Int32, "in", lambda message: got.append((local.now, message.data))))
+    start = local.now
+    publisher.publish(Int32(data=1))
+    local.on_wait = lambda: publisher.publish(Int32(data=100 + local.now - start))
+    executor.spin_one_period()
+    assert got == [(start, 1)]
+    local.on_wait = None
+    executor.spin_one_period()
+    executor.spin_one_period()
+    assert got == [(start, 1), (start + 10, 110), (start + 20, 7)]
+
+
+def test_each_message_published_is_as_it_was(local: InSpace) -> None:
+    heard = Heard(local, "out")
+    node = local.context.node("node")
+    publisher = node.publisher(Int32, "out")
+    message = Int32()
+
+    def call() -> None:
+        for i in range(3):
+            message.data = i
+            assert publisher.publish(message)
+        message.data = 99
+        publisher.write_bytes(b"\x2a\0\0\0")
+
+    executor = local.executor(semantics=LET, period=0.01)
+    executor.add(node.timer(0, call))
+    executor.spin_one_period()
+    assert heard.values() == [(10, "out", 0), (10, "out", 1), (10, "out", 2), (10, "out", 42)]
+
+
+def test_answers_and_requests_leave_at_the_end_too(bench: Bench) -> None:
+    node, other = bench.context.node("node"), bench.talker.node("other")
+    asked: list[int] = []
+    answered: list[Any] = []
+    node.service(AddTwoInts, "add", lambda request: AddTwoInts.Response(sum=request.a + request.b))
+    inner = node.client(AddTwoInts, "times")
+    seen: list[int] = []
+
+    def times(request: Any) -> Any:
+        asked.append(bench.now)
+        return AddTwoInts.Response(sum=request.a * request.b)
+
+    other.service(AddTwoInts, "times", times)
+    client = other.client(AddTwoInts, "add")
+    bench.settle()
+    request = AddTwoInts.Request(a=3, b=4)
+
+    def ask() -> None:
+        assert inner.send(request, lambda reply: seen.append(reply.sum))
+        request.a = 1000
+        timer.cancel()
+
+    timer = node.timer(0, ask)
+    others = Executor(bench.talker)
+    client.send(AddTwoInts.Request(a=1, b=2), lambda reply: answered.append((bench.now, reply.sum)))
+    bench.settle()
+    executor = bench.executor(semantics=LET, period=0.05)
+    start = bench.now
+    for _ in range(4):
+        executor.spin_one_period()
+        bench.settle()
+        others.spin_some(0.0)
+        others.spin_some(0.0)
+        bench.settle()
+    assert seen == [12]
+    assert [total for _, total in answered] == [3]
+    assert answered[0][0] >= start + 50
+    assert asked[0] >= start + 50
+
+
+def test_a_request_that_nobody_takes_has_no_answer(local: InSpace) -> None:
+    node = local.context.node("node")
+    client = node.client(AddTwoInts, "add")
+    got: list[Any] = []
+    executor = local.executor(semantics=LET, period=0.01)
+
+    def ask() -> None:
+        assert client.send(AddTwoInts.Request(), got.append)
+        timer.cancel()
+        client.entity.send = lambda request: 0
+
+    timer = node.timer(0, ask)
+    executor.add(timer)
+    executor.add(client)
+    executor.spin_one_period()
+    assert got == []
+    executor.spin_one_period()
+    assert got == [None]
+    assert executor.tasks[0].lost == 1
+
+
+def test_a_let_of_several_periods(local: InSpace) -> None:
+    plan = Plan(local, 1, 1, lets=(0.025, 0.004))
+    plan.run(6)
+    assert [call for call in plan.calls if call[1] == 0] == [(0, 0), (30, 0)]
+    assert [heard for heard in plan.heard.values() if heard[1] == "out_0"] == [
+        (30, "out_0", 0),
+        (60, "out_0", 30),
+    ]
+    assert [at for at, topic, _ in plan.heard.values() if topic == "out_1"] == [10, 20, 30, 40, 50, 60]
+    order = [topic for at, topic, _ in plan.heard.values() if at == 30]
+    assert order == ["out_0", "out_1"], "in the order of adding, whenever they were called"
+
+
+def test_a_let_of_exactly_two_periods_ends_with_the_second(local: InSpace) -> None:
+    plan = Plan(local, 1, lets=(0.02,))
+    plan.run(3)
+    assert plan.heard.values() == [(20, "out_0", 0)]
+
+
+def test_without_a_period_a_pass_is_one(local: InSpace) -> None:
+    heard = Heard(local, "out")
+    node = local.context.node("node")
+    publisher = node.publisher(Int32, "out")
+
+    def call() -> None:
+        publisher.publish(Int32(data=1))
+        local.take(3)
+
+    guard = GuardCondition(local.context, call)
+    late = GuardCondition(local.context, lambda: publisher.publish(Int32(data=2)))
+    executor = local.executor(semantics=LET)
+    guard.trigger()
+    late.trigger()
+    assert executor.spin_some()
+    assert heard.values() == [(3, "out", 1), (3, "out", 2)]
+    assert executor.overruns == 0
+    assert not executor.spin_some()
+
+
+def test_a_deterministic_executor_as_the_guide_has_it(local: InSpace) -> None:
+    """With a trigger: the laser is taken in the periods in which the timer is due."""
+    node = local.context.node("node")
+    laser = local.talker.node("talker").publisher(Int32, "laser")
+    ticks: list[int] = []
+    got: list[tuple[int, int]] = []
+    timer = node.timer(0.02, lambda: ticks.append(local.now - start))
+    subscription = node.subscription(Int32, "laser", None)
+    control = Executor(local.context, semantics=LET, period=0.010, trigger=one(timer))
+    control.add(timer)
+    control.add(subscription, lambda message: got.append((local.now - start, message.data)))
+    start = local.now
+    for i in range(7):
+        laser.publish(Int32(data=i))
+        control.spin_one_period()
+    assert ticks == [20, 40, 60]
+    assert got == [(20, 0), (40, 1), (60, 2)]
+
+
+def test_always_with_let(local: InSpace) -> None:
+    node = local.context.node("node")
+    say = local.talker.node("talker").publisher(Int32, "in")
+    got: list[int | None] = []
+    executor = local.executor(semantics=LET, period=0.01, trigger=always)
+    executor.add(
+        node.subscription(Int32, "in", None), lambda m: got.append(None if m is None else m.data), when=ALWAYS
+    )
+    for i in range(4):
+        if i == 2:
+            say.publish(Int32(data=5))
+        executor.spin_one_period()
+    assert got == [None, None, 5, None]
+
+
+# Overruns
+
+
+def overrun(local: InSpace, policy: int) -> Plan:
+    """Three callbacks of 2 ms; the second takes 15 ms in the second of five periods."""
+    plan = Plan(local, 2, 2, 2, overrun=policy)
+    plan.run(1)
+    plan.durations[1] = 15
+    plan.run(1)
+    plan.durations[1] = 2
+    plan.run(3)
+    return plan
+
+
+CALLS = {
+    GO_ON: [0, 2, 4, 10, 12, 27, 29, 31, 33, 35, 37, 39, 41, 43, 45],
+    CANCEL_CURRENT: [0, 2, 4, 10, 12, 27, 29, 31, 33, 35, 40, 42, 44],
+    CANCEL_WITHOUT_OUTPUT: [0, 2, 4, 10, 12, 27, 29, 31, 33, 35, 40, 42, 44],
+    CANCEL_NEXT: [0, 2, 4, 10, 12, 27, 30, 32, 34, 40, 42, 44],
+}
+"""When callbacks begin, by what follows an overrun."""
+
+COUNTS = {GO_ON: (6, 0), CANCEL_CURRENT: (2, 2), CANCEL_WITHOUT_OUTPUT: (2, 2), CANCEL_NEXT: (2, 0)}
+"""How many overruns that makes, the first one of which makes others late, and how many calls are cancelled."""
+
+
+@pytest.mark.parametrize("policy", CALLS)
+def test_what_follows_an_overrun(local: InSpace, policy: int) -> None:
+    told: list[tuple[int, str]] = []
+    local.context.on_problem(lambda code, text: told.append((code, text)))
+    plan = overrun(local, policy)
+    assert [at for at, _ in plan.calls] == CALLS[policy]
+    outputs = [(topic, value) for _, topic, value in plan.heard.values()]
+    expected = [(f"out_{i}", at) for at, i in plan.calls]
+    if policy == CANCEL_WITHOUT_OUTPUT:
+        expected = [(topic, at) for topic, at in expected if not 10 <= at < 31]
+    assert outputs == expected
+    assert all(at >= value for at, _, value in plan.heard.values())
+    assert (plan.executor.overruns, sum(task.skipped for task in plan.executor.tasks)) == COUNTS[policy]
+    assert [task.result for task in plan.executor.tasks] == ["NO_ERROR"] * 3, "the last run was in time"
+    assert told[0] == (
+        OVERRUN,
+        "call, the callback of the timer of 0 ms, ended 7 ms behind its let of 10 ms; 1 so far. "
+        "Give it less to do, or more time: add(..., let=), Executor(..., period=).",
+    )
+
+
+def test_every_overrun_is_told_to_who_asks(local: InSpace) -> None:
+    seen: list[tuple[Task, float]] = []
+    plan = Plan(local, 12, on_overrun=lambda task, seconds: seen.append((task, seconds)), lets=(0.005,))
+    told: list[int] = []
+    local.context.on_problem(lambda code, text: told.append(code))
+    plan.run(6)
+    assert [round(seconds, 3) for _, seconds in seen] == [0.007, 0.009, 0.011, 0.013, 0.015, 0.017]
+    assert {task for task, _ in seen} == set(plan.executor.tasks)
+    assert (plan.executor.overruns, plan.executor.tasks[0].overruns) == (6, 6)
+    assert plan.executor.tasks[0].result == "OVERRUN"
+    assert told == [OVERRUN] * 3, "the 1st, 2nd and 4th"
+
+
+# Limits and errors
+
+
+def test_a_publisher_that_publishes_too_much(bench: Bench) -> None:
+    node = bench.context.node("node")
+    many, few = node.publisher(Int32, "many"), node.publisher(Int32, "few")
+    got: list[int] = []
+    bench.talker.node("talker").subscription(Int32, "many", lambda message: got.append(message.data))
+    bench.settle()
+    caught: list[CapacityError] = []
+
+    def call() -> None:
+        few.publish(Int32(data=1))
+        try:
+            for i in range(10):
+                assert many.publish(Int32(data=i))
+        except CapacityError as error:
+            caught.append(error)
+
+    executor = bench.executor(semantics=LET, period=0.05, messages=7)
+    timer = node.timer(0, call)
+    executor.add(timer, messages=3)
+    executor.spin_one_period()
+    timer.cancel()
+    bench.settle()
+    listening = Executor(bench.talker)
+    for _ in range(5):
+        listening.spin_some(0.0)
+    assert str(caught[0]) == (
+        "3 messages of 3 of rt/many wait for the end of the period. Give add() or the executor messages=4."
+    )
+    assert caught[0].code == 1
+    assert got == [0, 1, 2]
+
+
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_a_callback_that_raises_publishes_nothing(local: InSpace, goes_on: bool) -> None:
+    plan = Plan(local, 1, 1, 1, on_error=GO_ON if goes_on else None)
+    local.context.on_problem(lambda code, text: None)
+    working = plan.executor.handles[1].callback
+
+    def fail() -> None:
+        working()
+        raise ZeroDivisionError
+
+    plan.executor.handles[1].callback = fail
+    if not goes_on:
+        with pytest.raises(ZeroDivisionError) as caught:
+            plan.run(1)
+        assert caught.value.__notes__[0].endswith("fail, the callback of the timer of 0 ms")
+        assert [task.state for task in plan.executor.tasks] == ["RUNNING", "RUNNING", "INACTIVE"]
+        plan.executor.handles[1].callback = working
+        plan.run(1)
+        assert [task.state for task in plan.executor.tasks] == ["INACTIVE"] * 3
+        return
+    plan.run(2)
+    assert [topic for _, topic, _ in plan.heard.values()] == ["out_0", "out_2"] * 2
+    assert [task.result for task in plan.executor.tasks] == ["NO_ERROR", "HANDLING_ERROR", "NO_ERROR"]
+    assert plan.executor.errors == 2
+
+
+def test_what_is_removed_or_destroyed_publishes_nothing_more(local: InSpace) -> None:
+    plan = Plan(local, 1, 1, lets=(0.03, 0.03))
+    plan.run(1)
+    first, second = plan.executor.handles
+    plan.executor.remove(first)
+    second.destroy()
+    plan.run(4)
+    assert plan.heard.values() == []
+    assert plan.executor.tasks == []
+
+
+def test_let_without_adding_runs_everything(local: InSpace) -> None:
+    heard = Heard(local, "out")
+    node = local.context.node("node")
+    publisher = node.publisher(Int32, "out")
+    node.timer(0.01, lambda: publisher.publish(Int32(data=local.now - heard.start)))
+    executor = local.executor(semantics=LET, period=0.01)
+    for _ in range(3):
+        executor.spin_one_period()
+    assert heard.values() == [(20, "out", 10), (30, "out", 20)]
+
+
+def test_spin_keeps_the_periods_and_stop_ends_behind_one(local: InSpace) -> None:
+    plan = Plan(local, 1)
+    local.on_wait = lambda: plan.executor.stop() if local.now - plan.heard.start >= 25 else None
+    plan.executor.spin()
+    assert plan.heard.values() == [(10, "out_0", 0), (20, "out_0", 10), (30, "out_0", 20)]
+
+
+def test_what_another_thread_publishes_leaves_at_once(local: InSpace) -> None:
+    heard = Heard(local, "out")
+    node = local.context.node("node")
+    publisher = node.publisher(Int32, "out")
+
+    def call() -> None:
+        publisher.publish(Int32(data=1))
+        other = threading.Thread(target=lambda: publisher.publish(Int32(data=2)))
+        other.start()
+        other.join()
+
+    executor = local.executor(semantics=LET, period=0.01)
+    executor.add(node.timer(0, call))
+    executor.spin_one_period()
+    assert heard.values() == [(0, "out", 2), (10, "out", 1)]
+
+
+# A callback that goes on beside the others
+
+
+def until(condition: Callable[[], bool]) -> None:
+    """Waits for another thread."""
+    for _ in range(20_000):
+        if condition():
+            return
+        time.sleep(0.001)
+    raise AssertionError("it did not come about within 20 s")
+
+
+def test_low_priority(local: InSpace) -> None:
+    """A callback that blocks holds up nobody: others are called in the next period, its output comes when it ends."""
+    plan = Plan(local, 0, 0, 0, overrun=LOW_PRIORITY)
+    told: list[tuple[int, str]] = []
+    local.context.on_problem(lambda code, text: told.append((code, text)))
+    gate, began, ended = threading.Event(), threading.Event(), threading.Event()
+    done = threading.Semaphore(0)
+    node = local.context.node("other")
+    publisher = node.publisher(Int32, "out_1")
+    handles = plan.executor.handles
+    first, last = handles[0].callback, handles[2].callback
+
+    def blocks() -> None:
+        publisher.publish(Int32(data=77))
+        began.set()
+        assert gate.wait(20)
+        ended.set()
+
+    def signals(callback: Callable[[], None]) -> Callable[[], None]:
+        def call() -> None:
+            callback()
+            done.release()
+
+        return call
+
+    handles[0].callback, handles[1].callback, handles[2].callback = signals(first), blocks, signals(last)
+    let: Any = plan.executor.let
+    tasks = plan.executor.tasks
+
+    def finished(number: int) -> None:
+        """So many of the quick callbacks have ended, as far as their tasks know."""
+        for _ in range(number):
+            assert done.acquire(timeout=20)
+        until(lambda: tasks[0].done and (number == 1 or tasks[2].done))
+
+    let.begin(local.now, PERIOD)
+    assert began.wait(20)
+    finished(1)
+    local.now += PERIOD
+    let.finish()
+    assert [(topic, value) for _, topic, value in plan.heard.values()] == [("out_0", 0)]
+    assert [task.state for task in tasks] == ["INACTIVE", "RUNNING", "RUNNING"], (
+        "the third came behind the second"
+    )
+    assert [code for code, _ in told] == [OVERRUN, OVERRUN]
+    let.begin(local.now, PERIOD)
+    finished(2)
+    local.now += PERIOD
+    let.finish()
+    assert sorted(topic for at, topic, _ in plan.heard.values() if at == 20) == ["out_0", "out_2"]
+    gate.set()
+    assert ended.wait(20)
+    until(lambda: tasks[1].done)
+    handles[1].callback = lambda: None
+    let.begin(local.now, PERIOD)
+    finished(2)
+    local.now += PERIOD
+    let.finish()
+    assert [value for at, topic, value in plan.heard.values() if topic == "out_1"] == [77]
+    assert tasks[1].state == "INACTIVE"
+    let.close()
+
+
+# Determinism
+
+
+class Graph:
+    """A program made from a seed: subscriptions, timers and guard conditions that publish on each other's topics.
+
+    `trace` has every call of a callback, `heard` everything that leaves.
+    """
+
+    TOPICS = 4
+
+    def __init__(self, seed: int, semantics: int, quick: bool = False) -> None:
+        self.local = InSpace()
+        self.random = random.Random(seed)
+        self.work = random.Random(seed + (7919 if quick else 0))
+        self.quick = quick
+        self.semantics = semantics
+        names = [f"t{i}" for i in range(self.TOPICS)]
+        self.heard = Heard(self.local, *names)
+        self.trace: list[tuple[int, str, int]] = []
+        self.node = self.local.context.node("node")
+        self.publishers = [self.node.publisher(Int32, name) for name in names]
+        outside = self.local.talker.node("outside")
+        self.inputs = [outside.publisher(Int32, name) for name in names]
+        options: dict[str, Any] = {"semantics": LET, "period": 0.01} if semantics == LET else {}
+        self.executor = self.local.executor(**options)
+        for i in range(self.random.randint(2, 7)):
+            self._add(i)
+
+    def run(self) -> "Graph":
+        """Twenty periods with inputs at random moments."""
+        moments = sorted(self.random.randint(0, 190) for _ in range(30))
+        plan = [(at, self.random.randrange(self.TOPICS), self.random.randint(-1000, 1000)) for at in moments]
+        start = self.heard.start
+
+        def feed() -> None:
+            while plan and plan[0][0] <= self.local.now - start:
+                _, topic, value = plan.pop(0)
+                self.inputs[topic].publish(Int32(data=value))
+
+        for _ in range(20):
+            if self.semantics == LET:
+                feed()
+                self._wait_with(feed)
+                self.executor.spin_one_period()
+            else:
+                feed()
+                self.executor.spin_some(0.0)
+                self.local.now += 10
+        self.local.close()
+        return self
+
+    def _wait_with(self, feed: Callable[[], None]) -> None:
+        """Inputs come at the end of a period, however long the callbacks took."""
+        end = (self.local.now - self.heard.start) // 10 * 10 + 10
+        self.local.on_wait = lambda: feed() if self.local.now - self.heard.start >= end else None
+
+    def _add(self, i: int) -> None:
+        kind = self.random.choice(("subscription", "subscription", "timer", "guard"))
+        target = self.random.randrange(self.TOPICS)
+        factor = self.random.randint(2, 9)
+        chance = self.random.random()
+        state = {"calls": 0, "dice": random.Random(self.random.random())}
+
+        def call(value: int) -> None:
+            dice: Any = state["dice"]
+            state["calls"] = calls = state["calls"] + 1  # type: ignore[operator]
+            self.trace.append((self.local.now - self.heard.start, f"{kind} {i}", value))
+            if dice.random() < chance / 2:
+                self.publishers[target].publish(Int32(data=(value * factor + calls) % 10007))
+            for guard in guards:
+                if dice.random() < 0.2:
+                    guard.trigger()
+            if self.semantics == LET:
+                self.local.take(0 if self.quick else self.work.choice((0, 0, 1)))
+
+        guards = [handle for handle in self.executor.handles if isinstance(handle, GuardCondition)]
+        if kind == "subscription":
+            topic = self.random.randrange(self.TOPICS)
+            handle: Any = self.node.subscription(Int32, f"t{topic}", lambda message: call(message.data))
+        elif kind == "timer":
+            handle = self.node.timer(self.random.choice((0.01, 0.02, 0.03)), lambda: call(0))
+        else:
+            handle = GuardCondition(self.local.context, lambda: call(1))
+        lets = (0, 0, 0, 0.01, 0.02, 0.03)
+        self.executor.add(handle, let=self.random.choice(lets) if self.semantics == LET else 0)
+
+
+SEEDS = range(120)
+
+
+@pytest.mark.parametrize("semantics", [RCLCPP, LET], ids=["rclcpp", "let"])
+def test_the_same_inputs_give_the_same_callbacks_and_outputs(semantics: int) -> None:
+    calls = outputs = 0
+    for seed in SEEDS:
+        first, again = (Graph(seed, semantics).run() for _ in range(2))
+        assert first.trace == again.trace, f"seed {seed}"
+        assert first.heard.all == again.heard.all, f"seed {seed}"
+        calls, outputs = calls + len(first.trace), outputs + len(first.heard.all)
+    assert calls > 3000
+    assert outputs > 3000
+
+
+def test_outputs_never_leave_before_the_end_and_depend_on_no_speed() -> None:
+    """The same program on a computer that takes no time: the same outputs at the same instants, all at an end."""
+    computed = 0
+    for seed in SEEDS:
+        slow, quick = Graph(seed, LET).run(), Graph(seed, LET, quick=True).run()
+        assert slow.executor.overruns == 0, f"seed {seed}: nothing that was to be compared"
+        assert slow.heard.all == quick.heard.all, f"seed {seed}"
+        assert [call[1:] for call in slow.trace] == [call[1:] for call in quick.trace], f"seed {seed}"
+        computed += slow.trace != quick.trace
+        inputs = {at for at, _, _ in slow.heard.all if at % PERIOD}
+        assert not inputs, f"seed {seed}: something left at {inputs}"
+    assert computed > 50, "most of them did take time"
