@@ -46,7 +46,7 @@ def vector(name: str) -> dict[str, Any]:
 class Scene:
     """The server and its surroundings. ``step`` and ``run`` move the time, in ms."""
 
-    def __init__(self, parameters: dict[str, Any] | None = None, byte_us: int = 0, **limits: int) -> None:
+    def __init__(self, parameters: dict[str, Any] | None = None, baud: int = 0, **limits: int) -> None:
         self.now = 1_000
         self.space = open_space("local:", clock=lambda: self.now * 1_000_000)
         self.findings = Findings()
@@ -54,7 +54,7 @@ class Scene:
         self.findings.on_finding(self.told.append)
         self.events: list[Event] = []
         self.soon: list[Callable[[], object]] = []
-        self.byte_us = byte_us
+        self.baud = baud
         self.world = SpaceWorld(
             self.space, wall=self.wall, later=self.soon.append, parameters=lambda node: parameters or {}
         )
@@ -73,7 +73,7 @@ class Scene:
 
     def identify(self, address: Hashable) -> Identity:
         """Boards are called after their address."""
-        return Identity(address, str(address), f"/board_{address}", self.byte_us)
+        return Identity(address, str(address), f"/board_{address}", self.baud)
 
     def step(self, ms: int = 1) -> None:
         """Lets time pass, a millisecond at a time."""

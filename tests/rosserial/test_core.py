@@ -86,7 +86,7 @@ def test_the_time_that_a_board_gets_is_right_however_long_the_answer_takes() -> 
     scene.until(lambda: board.clock)
     assert board.clock is not None
     assert abs(board.clock - scene.wall()) <= 1_000_000
-    slow = Scene(byte_us=174)
+    slow = Scene(baud=57600)
     late = RosLib(slow)
     late.plug()
     slow.until(lambda: late.clock)
@@ -460,7 +460,7 @@ def test_a_type_that_can_never_fit_is_said_when_it_is_named() -> None:
 
 
 def test_what_is_slow_on_the_line_is_warned_about_by_topic() -> None:
-    scene = Scene(byte_us=174)  # 57600 baud
+    scene = Scene(baud=57600)
     board = RosLib(scene)
     board.subscriber("imu", "sensor_msgs/Imu")
     board.subscriber("text", "std_msgs/String")
@@ -478,7 +478,7 @@ def test_what_is_slow_on_the_line_is_warned_about_by_topic() -> None:
 
 
 def test_a_flood_for_a_slow_line_keeps_the_newest_and_delays_no_time() -> None:
-    scene = Scene(byte_us=174)
+    scene = Scene(baud=57600)
     board = RosLib(scene)
     text = board.subscriber("text", "std_msgs/String")
     other = board.subscriber("other", "std_msgs/String")

@@ -8,8 +8,8 @@ bytes).
 import os
 import re
 import time
-from collections.abc import Callable, Iterator, Sequence
-from typing import Final, NamedTuple, Protocol, TextIO
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, ClassVar, Final, NamedTuple, Protocol, TextIO
 
 from muros.agent.events import (
     ClientBack,
@@ -19,7 +19,6 @@ from muros.agent.events import (
     ClientReady,
     EntityCreated,
     EntityDeleted,
-    Event,
     LinkDown,
     LinkUp,
 )
@@ -63,14 +62,21 @@ class Message(NamedTuple):
     data: bytes
 
 
+class Told(Protocol):
+    """Something that happened, at the agent or at another server."""
+
+    def text(self) -> str:
+        """One line for people."""
+
+
 class Style(Protocol):
     """How things are said. Each method yields the lines for one thing; `now` is the wall clock in seconds."""
 
     def started(self, now: float, banner: str, links: Sequence[str], verbose: int) -> Iterator[Line]:
         """The agent runs; `links` are the names of its links."""
 
-    def event(self, now: float, event: Event) -> Iterator[Line]:
-        """Something happened at the agent."""
+    def event(self, now: float, event: Told) -> Iterator[Line]:
+        """Something happened at the agent, or at another server."""
 
     def finding(self, now: float, finding: Finding) -> Iterator[Line]:
         """Something was dropped, refused or unmatched."""
@@ -104,8 +110,8 @@ class Log:
         """Says that the agent runs."""
         self._print(self._style.started(self._clock(), banner, links, self._verbose))
 
-    def event(self, event: Event) -> None:
-        """Says an event of the agent."""
+    def event(self, event: Told) -> None:
+        """Says an event of the agent, or of another server."""
         self._print(self._style.event(self._clock(), event))
 
     def finding(self, finding: Finding) -> None:
@@ -135,7 +141,7 @@ class Log:
 class MurosStyle:
     """`[12:00:01] client 0xBA5EBA11 connected from 192.168.1.23:50210`"""
 
-    _EVENTS: Final[dict[type[Event], tuple[int, str]]] = {
+    EVENTS: ClassVar[Mapping[type[Any], tuple[int, str]]] = {
         LinkUp: (INFO, PLAIN),
         LinkDown: (WARNING, YELLOW),
         ClientConnected: (INFO, GREEN),
@@ -151,9 +157,9 @@ class MurosStyle:
         """The banner."""
         yield Line(CRITICAL, PLAIN, banner)
 
-    def event(self, now: float, event: Event) -> Iterator[Line]:
+    def event(self, now: float, event: Told) -> Iterator[Line]:
         """The event's own text."""
-        level, color = self._EVENTS.get(type(event), (INFO, PLAIN))
+        level, color = self.EVENTS.get(type(event), (INFO, PLAIN))
         yield Line(level, color, f"{_stamp(now)} {printable(event.text())}")
 
     def finding(self, now: float, finding: Finding) -> Iterator[Line]:
@@ -192,7 +198,7 @@ class ReferenceStyle:
         detail = f"verbose_level: {verbose}"
         yield self._line(now, INFO, "Root.cpp", "set_verbose_level", "logger setup", detail)
 
-    def event(self, now: float, event: Event) -> Iterator[Line]:
+    def event(self, now: float, event: Told) -> Iterator[Line]:
         """The lines the reference prints at that moment; events it does not have are passed over."""
         match event:
             case ClientConnected(key, session_id, address):

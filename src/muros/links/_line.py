@@ -107,7 +107,7 @@ class Port:
         self.real_path = os.path.realpath(device)
         self.addresses: dict[int, LineAddress] = {}
         self.garbage = 0
-        self._fd = fd
+        self.fd = fd
         self._close = close
         self.channel = Channel(
             fd,
@@ -121,4 +121,4 @@ class Port:
     def shut(self) -> None:
         """Ends the line at once and in silence."""
         self.channel.stop()
-        self._close(self._fd)
+        self._close(self.fd)

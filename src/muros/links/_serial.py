@@ -17,7 +17,14 @@ from typing import ClassVar
 from muros.links._door import Cause, LinkError
 from muros.links._framing import MakeFraming, SerialFraming
 from muros.links._line import QUEUE_BYTES, LineLink, Port
-from muros.links._terminal import AbsentError, baud_code, close_terminal, open_terminal, serial_ports
+from muros.links._terminal import (
+    AbsentError,
+    baud_code,
+    change_baud,
+    close_terminal,
+    open_terminal,
+    serial_ports,
+)
 
 BAUD = 115200
 """Bits per second, as upstream agents have it by default."""
@@ -53,12 +60,26 @@ class SerialLink(LineLink):
         self.baud = baud
         self._retry = retry
         self._told: dict[str, str] = {}
+        self._bauds: dict[str, int] = {}
         self._timer: asyncio.TimerHandle | None = None
 
     @property
     def name(self) -> str:
         kind = "serial" if len(self.devices) == 1 else "multiserial"
         return f"{kind} {' '.join(self.devices)} at {self.baud}"
+
+    def baud_of(self, device: str) -> int:
+        """The rate of one of the ports in bits per second."""
+        return self._bauds.get(device, self.baud)
+
+    def set_baud(self, device: str, baud: int) -> None:
+        """Gives one of the ports a rate of its own, now and whenever it is opened again. Raises `LinkError`."""
+        port = self._ports.get(device)
+        if port is None:
+            baud_code(device, baud)
+        else:
+            change_baud(device, port.fd, baud)
+        self._bauds[device] = baud
 
     def _open(self) -> None:
         if not self.devices:
@@ -106,7 +127,7 @@ class SerialLink(LineLink):
 
     def _try(self, device: str, strict: bool) -> None:
         try:
-            fd = open_terminal(device, self.baud)
+            fd = open_terminal(device, self.baud_of(device))
         except AbsentError:
             self._say_once(device, _absent())
             return
@@ -117,7 +138,7 @@ class SerialLink(LineLink):
             return
         self._told.pop(device, None)
         port = self._ports[device] = Port(self, device, fd, close_terminal)
-        self._opened(port, f"{device} at {self.baud}")
+        self._opened(port, f"{device} at {self.baud_of(device)}")
 
     def _say_once(self, device: str, cause: Cause) -> None:
         """Says once why a port does not open, not at every look."""

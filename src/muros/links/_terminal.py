@@ -74,6 +74,16 @@ def open_terminal(device: str, baud: int) -> int:
     return fd
 
 
+def change_baud(device: str, fd: int, baud: int) -> None:
+    """Gives an open line another rate; what came before at the old one is thrown away. Raises `LinkError`."""
+    code = baud_code(device, baud)
+    try:
+        make_raw(fd, code)
+        termios.tcflush(fd, termios.TCIFLUSH)
+    except termios.error as error:
+        raise LinkError(device, str(error.args[1]), "Choose a rate that the device has.") from error
+
+
 def close_terminal(fd: int) -> None:
     """Closes at once: without the flush a line that takes no data would hold us up for half a minute."""
     with suppress(termios.error):

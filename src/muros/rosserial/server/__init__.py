@@ -8,7 +8,7 @@ from muros.rosserial.server._diagnosis import judge
 from muros.rosserial.server._door import BodyError, Caller, Node, Publisher, RefusedError, Subscriber, World
 from muros.rosserial.server._door import Server as Answerer
 from muros.rosserial.server._limits import Limits
-from muros.rosserial.server._lines import BAUD, TCP_PORT, RawFraming, serial_line, tcp_line
+from muros.rosserial.server._lines import BAUD, BAUDS, TCP_PORT, RawFraming, serial_line, tcp_line
 from muros.rosserial.server._server import NODE_NAME, Server
 from muros.rosserial.server._space_world import SpaceWorld
 from muros.rosserial.server.events import (
@@ -19,6 +19,7 @@ from muros.rosserial.server.events import (
     BoardLost,
     BoardReady,
     BoardReset,
+    BufferKnown,
     EndpointSetUp,
     Event,
     LineDown,
@@ -27,6 +28,7 @@ from muros.rosserial.server.events import (
 
 __all__ = [
     "BAUD",
+    "BAUDS",
     "NODE_NAME",
     "TCP_PORT",
     "Answerer",
@@ -38,6 +40,7 @@ __all__ = [
     "BoardReady",
     "BoardReset",
     "BodyError",
+    "BufferKnown",
     "Caller",
     "EndpointSetUp",
     "Event",

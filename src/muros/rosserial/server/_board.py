@@ -61,6 +61,7 @@ from muros.rosserial.server.events import (
     BoardLost,
     BoardReady,
     BoardReset,
+    BufferKnown,
     EndpointSetUp,
 )
 
@@ -106,12 +107,16 @@ _TIME_PERIOD = 2_000
 """A request for the time that comes earlier after the last one is not the regular one, in ms (that is 2.5 s)."""
 _OPEN = 3_000
 """How long a topic request may still be answered, in ms."""
+_BOOT = 2_000
+"""Silence until other rates are tried: boards may start when their port is opened, in ms."""
 _CHECK_AFTER = 700
 """Silence before checks begin, in ms."""
 _TRIES = 3
 """Unanswered topic requests in the version that was heard until both are tried again; also requests after damage."""
 _BRANCHES = {0: ID_PUBLISHER, 1: ID_SUBSCRIBER, 2: ID_SERVICE_SERVER, 3: ID_SERVICE_SERVER, 4: 4, 5: 4}
 _MISSES = 2
+_BITS = 10
+"""Bits of a byte on a serial line, start and stop bit included."""
 _TIME_BYTES = 16
 
 
@@ -130,6 +135,7 @@ class Board:
         self.label = label
         self.who = f"board {label}"
         self.node_name = node_name
+        self.baud = 0
         self.state = AWAY
         self.version = 0
         """The version it speaks; 0 until it was heard."""
@@ -177,17 +183,18 @@ class Board:
 
     # What happens to the line
 
-    def line_up(self, link: Link, address: Hashable, byte_us: int, now: int) -> None:
+    def line_up(self, link: Link, address: Hashable, baud: int, now: int) -> None:
         """The line is there: the board is asked."""
         self._now = now
         self._step(LINE_UP)
         self.output.link, self.output.address = link, address
-        self.output.byte_us = self.decoder.byte_us = byte_us
+        self.set_baud(baud)
         self.output.clear()
         self.decoder.reset()
         self.decoder.version = ANY_VERSION
         self.decoder.limit = self.core.limits.max_payload
         self.version = 0
+        self.input_buffer = self.output_buffer = 0
         self.last_time = None
         self._open_asks.clear()
         self._first_ask = self.heard_at = now
@@ -196,6 +203,11 @@ class Board:
         self.suspicions.begin(now)
         self._ask(now)
         self._plan(now)
+
+    def set_baud(self, baud: int) -> None:
+        """The rate of the line in bits per second; 0 if it is no matter."""
+        self.baud = baud
+        self.output.byte_us = self.decoder.byte_us = _BITS * 1_000_000 // baud if baud else 0
 
     def line_down(self, reason: str, now: int) -> None:
         """The line is gone; what the board has stays for a while."""
@@ -251,6 +263,7 @@ class Board:
             self.suspicions.look(now)
         if self.state == ASKING:
             if now >= self._asked_at + self.core.limits.ask:
+                self._try_elsewhere(now)
                 self._ask(now)
             self.suspicions.unanswered(now)
         elif self.state == SYNCED:
@@ -339,6 +352,12 @@ class Board:
         self._damage = self.suspicions.damage
         self.output.post(PROBE if both else frame(ID_PUBLISHER, b"", self.version))
         self.pump(now)
+
+    def _try_elsewhere(self, now: int) -> None:
+        """The rate of the line may be wrong: after a while, as a board may still be starting, others are tried."""
+        tell = self.core.on_unanswered
+        if tell is not None and not self.version and now - self._first_ask >= _BOOT and tell(self):
+            self.decoder.reset()
 
     def _answered(self, now: int) -> None:
         """The board says something that belongs to negotiation."""
@@ -455,7 +474,7 @@ class Board:
         self.decoder.version = heard
         if self.version != heard:
             self.version = heard
-            self.core.tell(BoardHeard(self.label, heard))
+            self.core.tell(BoardHeard(self.label, heard, self.baud))
         return True
 
     def _protocol(self, topic_id: int, buf: Buffer, off: int, n: int, now: int) -> None:
@@ -499,8 +518,12 @@ class Board:
         """The board names a topic, or one half of a service."""
         self._answered_topics(now)
         if half in (ID_SUBSCRIBER, ID_SERVICE_SERVER + 1, ID_SERVICE_CLIENT + 1):
+            if not self.input_buffer:
+                self.core.tell(BufferKnown(self.label, "subscribe", info.buffer_size))
             self.input_buffer = max(info.buffer_size, 0)
         else:
+            if not self.output_buffer:
+                self.core.tell(BufferKnown(self.label, "publish", info.buffer_size))
             self.output_buffer = max(self.output_buffer, info.buffer_size)
             self.decoder.limit = min(self.core.limits.max_payload, max(self.output_buffer, OVERHEAD))
         branch = _BRANCHES[half]

@@ -30,8 +30,8 @@ class Identity(NamedTuple):
     """For people: ``/dev/ttyACM0``, ``192.168.1.7``."""
     node_name: str
     """Full name of its node."""
-    byte_us: int
-    """How long a byte takes on its line in microseconds; 0 if that is not known or no matter."""
+    baud: int
+    """The rate of its line in bits per second; 0 if that is not known or no matter."""
 
 
 class Port:
@@ -66,7 +66,8 @@ class ServerCore:
     """Boards, time and findings of a server.
 
     ``wall`` gives the wall clock in ns, for findings; ``clock`` the monotonic one in ms. ``on_event`` gets every event,
-    ``on_wake(when)`` is called when `tick` is needed earlier than it said.
+    ``on_wake(when)`` is called when `tick` is needed earlier than it said. ``on_unanswered(board)`` may change the rate
+    of the line of a board that has not been heard yet; it says whether it did.
     """
 
     def __init__(
@@ -84,6 +85,7 @@ class ServerCore:
         self.clock = clock
         self.on_event: Callable[[Event], object] | None = None
         self.on_wake: Callable[[int], object] | None = None
+        self.on_unanswered: Callable[[Board], bool] | None = None
         self.boards: list[Board] = []
         self._wall = wall
         self._diagnosed_at: int | None = None
@@ -111,7 +113,7 @@ class ServerCore:
             del port.boards[key]
         port.boards[address] = board
         self.tell(LineUp(board.label))
-        board.line_up(port.link, address, who.byte_us, now)
+        board.line_up(port.link, address, who.baud, now)
         if self.limits.diagnostics and self._diagnosed_at is None:
             self._diagnosed_at = now + self.limits.diagnostics
             self.wake(self._diagnosed_at)

@@ -106,12 +106,17 @@ class Suspicions:
         board = self._board
         if not bad or not board.version:
             return  # what comes before the first frame is judged as a whole
-        words = ("with a wrong checksum", "with a wrong length", "too long", "cut short")
+        words = (
+            "wrong checksum for topic id and msg",
+            "wrong checksum for msg length",
+            "longer than the board's buffer",
+            "cut short",
+        )
         kinds = ", ".join(f"{n} {word}" for n, word in zip(news, words, strict=False) if n)
         board.report(
             "line-damage",
             what=f"{{n}} damaged frame{{s}} of {board.who} passed over",
-            why=f"line noise, or something else that writes to this port ({kinds})",
+            why=f"{kinds}: line noise, or something else that writes to this port",
             remedy="Check cable and ground, lower the rate, and print nothing on this port",
             n=bad,
         )
@@ -122,13 +127,12 @@ class Suspicions:
             return
         self._said_at = now
         board = self._board
-        baud = 10_000_000 // board.output.byte_us if board.output.byte_us else 0
         why, remedy = judge(
             board.received_bytes - self._received,
             self._sample,
             self.damage,
             board.decoder.frames - self._frames,
-            baud,
+            board.baud,
         )
         board.report(
             "no-sync",

@@ -12,14 +12,14 @@ from collections.abc import Hashable, Mapping, Sequence
 from muros.links import LineAddress, Link, SerialLink, TcpLink
 from muros.rosserial.server._core import Identity
 
-__all__ = ["BAUD", "TCP_PORT", "RawFraming", "identify", "serial_line", "tcp_line"]
+__all__ = ["BAUD", "BAUDS", "TCP_PORT", "RawFraming", "identify", "serial_line", "tcp_line"]
 
 BAUD = 57600
 """Bits per second that rosserial firmware has by default."""
+BAUDS = (57600, 115200, 230400, 1000000, 500000, 921600, 38400, 19200, 9600, 460800, 2000000)
+"""The rates that are tried one after the other where none is given: the usual ones first."""
 TCP_PORT = 11411
 """Where boards with a network dial in."""
-_BITS = 10
-"""Bits of a byte on a serial line, start and stop bit included."""
 _READ_BYTES = 4096
 """So much is read from one connection before the others have their turn."""
 _OWN_RATE = re.compile(r"/dev/(ttyACM|ttyGS|rfcomm|pts/)")
@@ -55,11 +55,10 @@ def tcp_line(port: int = TCP_PORT, host: str | None = None) -> TcpLink:
 def identify(link: Link, address: Hashable, name: str, alone: bool) -> Identity:
     """Who is at an address of a link. ``name`` is the full name for nodes; ``alone``: without the line's name."""
     if isinstance(address, LineAddress):
-        baud = link.baud if isinstance(link, SerialLink) else 0
         own = _OWN_RATE.match(os.path.realpath(address.device))
-        byte_us = 0 if own or not baud else _BITS * 1_000_000 // baud
+        baud = link.baud_of(address.device) if isinstance(link, SerialLink) and not own else 0
         node = name if alone else f"{name}_{_token(os.path.basename(address.device))}"
-        return Identity(("line", address.device), address.device, node, byte_us)
+        return Identity(("line", address.device), address.device, node, baud)
     host = str(address[0]) if isinstance(address, tuple) else str(address)
     node = name if alone else f"{name}_{_token(host)}"
     return Identity((link.name, host), host, node, 0)

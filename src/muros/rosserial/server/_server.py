@@ -18,10 +18,11 @@ from dataclasses import replace
 from typing import Any
 
 from muros.findings import Finding, Findings
-from muros.links import Link
+from muros.links import LineAddress, Link, LinkError, SerialLink
+from muros.rosserial.server._board import Board
 from muros.rosserial.server._core import ServerCore
 from muros.rosserial.server._limits import Limits
-from muros.rosserial.server._lines import BAUD, TCP_PORT, identify, serial_line, tcp_line
+from muros.rosserial.server._lines import BAUD, BAUDS, TCP_PORT, identify, serial_line, tcp_line
 from muros.rosserial.server._space_world import SpaceWorld
 from muros.rosserial.server.events import Event, LineDown
 from muros.space import Space, open_space
@@ -76,6 +77,8 @@ class Server:
         self.core = ServerCore(self._world, self.findings, limits=made, wall=time.time_ns, clock=_now)
         self.core.on_event = self._tell
         self.core.on_wake = self._arm
+        self.core.on_unanswered = self._next_baud
+        self._finding_baud: set[Link] = set()
         self.links: list[Link] = []
         self._adapters: dict[Link, _LinkAdapter] = {}
         self._watchers: list[Callable[[Event], object]] = []
@@ -86,9 +89,14 @@ class Server:
         self._closed: asyncio.Event | None = None
         self._ended = False
 
-    def add_serial(self, devices: str | Sequence[str], baud: int = BAUD, *, name: str | None = None) -> Link:
-        """Adds serial ports, by path, by-id name or pattern; see `add_link`."""
-        return self.add_link(serial_line(devices, baud), name=name)
+    def add_serial(
+        self, devices: str | Sequence[str], baud: int | None = BAUD, *, name: str | None = None
+    ) -> Link:
+        """Adds serial ports, by path, by-id name or pattern; ``baud`` None: the rate is found out. See `add_link`."""
+        link = serial_line(devices, baud or BAUD)
+        if baud is None:
+            self._finding_baud.add(link)
+        return self.add_link(link, name=name)
 
     def add_tcp(self, port: int = TCP_PORT, host: str | None = None, *, name: str | None = None) -> Link:
         """Adds a port where boards dial in; see `add_link`."""
@@ -187,6 +195,22 @@ class Server:
             self._timer = None
         for link in self.links:
             link.close()
+
+    def _next_baud(self, board: Board) -> bool:
+        """Tries another rate with a board that does not answer, if its line has none of its own."""
+        link, address = board.output.link, board.output.address
+        if not isinstance(link, SerialLink) or not isinstance(address, LineAddress):
+            return False
+        if link not in self._finding_baud:
+            return False
+        baud = link.baud_of(address.device)
+        at = BAUDS.index(baud) + 1 if baud in BAUDS else 0
+        try:
+            link.set_baud(address.device, BAUDS[at % len(BAUDS)])
+        except LinkError:
+            return False
+        board.set_baud(self._adapters[link].port.identify(address).baud)
+        return True
 
     def _later(self, call: Callable[[], object]) -> None:
         if self._loop is not None:

@@ -13,6 +13,7 @@ __all__ = [
     "BoardLost",
     "BoardReady",
     "BoardReset",
+    "BufferKnown",
     "EndpointSetUp",
     "Event",
     "LineDown",
@@ -61,10 +62,25 @@ class BoardHeard(Event):
     """The first good frame of a board; ``version`` is the second byte of its frames."""
 
     version: int
+    baud: int = 0
+    """The rate of its line in bits per second; 0 if it has none, or its own."""
 
     def text(self) -> str:
         """One line for people."""
-        return f"board {self.board} speaks rosserial ({_VERSIONS.get(self.version, hex(self.version))})"
+        rate = f" at {self.baud} baud" if self.baud else ""
+        return f"board {self.board} speaks rosserial{rate} ({_VERSIONS.get(self.version, hex(self.version))})"
+
+
+@dataclass(frozen=True, slots=True)
+class BufferKnown(Event):
+    """A board has said how much it can send (``publish``) or take (``subscribe``) at once, in bytes."""
+
+    way: str
+    size: int
+
+    def text(self) -> str:
+        """One line for people."""
+        return f"Note: {self.way} buffer size is {self.size} bytes"
 
 
 @dataclass(frozen=True, slots=True)
