@@ -27,6 +27,7 @@ from muros.rtps._constants import (
     ENTITYID_SEDP_SUBSCRIPTIONS_READER,
     ENTITYID_SPDP_READER,
     ENTITYID_SPDP_WRITER,
+    VENDOR_CYCLONE,
     BuiltinEndpoint,
     StatusInfo,
 )
@@ -98,7 +99,11 @@ def test_an_acknack_needs_no_destination() -> None:
 
 
 def test_answers_go_where_info_reply_says_for_the_rest_of_its_message() -> None:
-    world, process, participant, stranger = met()
+    world = World()
+    process = world.process()
+    participant = process.participant()
+    stranger = Stranger(process, vendor=VENDOR_CYCLONE)
+    stranger.announce()
     process.reader(participant)
     stranger.endpoint(0x103)
     world.run(SECOND)

@@ -11,6 +11,7 @@ from muros.findings import Finding, Findings
 from muros.rtps import (
     DomainCore,
     DomainReport,
+    DomainSettings,
     EndpointQos,
     LocalReader,
     LocalWriter,
@@ -44,7 +45,7 @@ class Computer:
         self._carriers: list[_Carrier]
 
     def _carrier(self, number: int, findings: Findings, report: Callable[[DomainReport], None]) -> "_Carrier":
-        self.process = self.net.world.process(domain=number)
+        self.process = self.net.world.process(domain=number, settings=self.net.settings)
         self.process.core._report = report
         return _Carrier(self.process)
 
@@ -93,7 +94,8 @@ class _Carrier:
 class Net:
     """A network, and time."""
 
-    def __init__(self, seed: int = 1, **faults: Any) -> None:
+    def __init__(self, seed: int = 1, settings: DomainSettings | None = None, **faults: Any) -> None:
+        self.settings = settings
         self.world = World(seed, **faults)
         self.computers: list[Computer] = []
         self.strangers: list[Process] = []

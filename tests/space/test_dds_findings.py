@@ -177,7 +177,7 @@ class TestServices:
         reader, stolen = victim.reader(ADD.reply_topic, ADD.reply_type)
         victim.writer(ADD.request_topic, ADD.request_type)
         server = one.space.participant("server").replier(ADD)
-        net.until(lambda: server.clients == 2)
+        net.until(lambda: server.clients == 2 and asked.matched)
         related = inline_qos(related=identity_of(reader.guid, -1 << 32))
         asked.write(encapsulated(b"x"), other.now, inline_qos=related)
         net.run()

@@ -576,7 +576,7 @@ class TestDialects:
         asked = cyclone.writer(ADD.request_topic, ADD.request_type)
         cyclone.reader(ADD.reply_topic, ADD.reply_type)
         server = one.space.participant("server").replier(ADD)
-        net.until(lambda: server.clients == 1)
+        net.until(lambda: server.clients == 1 and asked.matched)
         asked.write(encapsulated(b"8 bytes."), cyclone.now)
         net.run()
         request = server.take()

@@ -1,12 +1,13 @@
 """The contract of all engines for a dds space that is spread over two computers.
 
-Participants are made on one and the other in turn; the network between them takes no time, so that the tests' own
-clock decides. What is found is that of both computers.
+Participants are made on one and the other in turn; the network between them takes no time, and discovery does not
+wait for company, so that the tests' own clock decides. What is found is that of both computers.
 """
 
 from typing import Any, Self
 
 from muros.findings import Findings
+from muros.rtps import DomainSettings, ReaderSettings, WriterSettings
 from muros.space import Participant
 from tests.space.dds_world import Net
 from tests.space.test_dds import TestDds as Together
@@ -59,7 +60,8 @@ class TestSpread(Together):
     test_a_key_is_used_once: Any = None
 
     def open_space(self) -> Any:
-        self.net = Net(delay=(0.0, 0.0))
+        at_once = DomainSettings(discovery_writer=WriterSettings(), discovery_reader=ReaderSettings())
+        self.net = Net(settings=at_once, delay=(0.0, 0.0))
         return Spread(
             self.net,
             resource_limit=self.LIMIT,

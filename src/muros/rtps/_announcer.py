@@ -1,7 +1,7 @@
 """Says that a participant of ours is there (DDSI-RTPS 2.3, 8.5.3: the simple participant discovery protocol).
 
 One participant of a process does so often in its first second, then with a steady period, to all addresses known in
-advance; the others once. All do it to the participants that are known, where they listen, often enough for the lease;
+advance; the others once, to groups. All do it to the participants that are known, where they listen, often enough for the lease;
 and at once to each that is met. Announcements have no
 acknowledgement: what is lost is said again. To one just met it is said again soon, unless it talks to us meanwhile:
 it may have begun to listen only after our answer.
@@ -16,6 +16,7 @@ from muros.rtps._discovery_data import ParticipantData, departure
 from muros.rtps._domain_settings import DomainSettings
 from muros.rtps._endpoint import MILLISECOND, NEVER, SECOND, Send
 from muros.rtps._peer import Peer
+from muros.rtps._reach import is_multicast
 from muros.rtps._values import GuidPrefix, Locator
 from muros.rtps._wire import data as data_submessage
 
@@ -27,6 +28,12 @@ SHARE: Final = 5
 AGAIN: Final = (100 * MILLISECOND, 400 * MILLISECOND, SECOND)
 """When after it was met a participant that does not talk to us is told again that we are there."""
 
+PAUSE: Final = 50 * MILLISECOND
+"""Participants at one place hear each other's mail: so soon after it was told, it is not told again."""
+
+PLACES_MOST: Final = 1024
+"""Places remembered for that."""
+
 
 class Announcer(Timed):
     """Announces one participant; put it on the agenda to make it begin.
@@ -37,7 +44,7 @@ class Announcer(Timed):
 
     __slots__ = (
         "_anew", "_burst", "_changed", "_content", "_data", "_leads", "_number", "_period", "_send", "_sequence",
-        "_settings", "_told", "announce_to", "peers",
+        "_settings", "_told", "_told_at", "announce_to", "peers",
     )  # fmt: skip
 
     def __init__(
@@ -62,6 +69,7 @@ class Announcer(Timed):
         self._anew = True
         self._changed = False
         self._told = -NEVER
+        self._told_at: dict[Locator, int] = {}
         self._burst: list[int] = []
         self.change(data, now)
         self._changed = False
@@ -78,6 +86,7 @@ class Announcer(Timed):
         self._sequence = self._number()
         self._period = max(1, min(self._settings.announce_period, self._share()))
         self._changed = True
+        self._told_at.clear()
         self._begin(now)
 
     def lead(self, now: int) -> None:
@@ -88,7 +97,8 @@ class Announcer(Timed):
     def wake(self, now: int) -> int:
         places: dict[Locator, None] = {}
         if self._leads or self._anew:
-            places.update(dict.fromkeys(self.announce_to))
+            # The lead is heard by all that listen anywhere, and who answers it is told of the others.
+            places.update(dict.fromkeys(at for at in self.announce_to if self._leads or is_multicast(at)))
         if now + self._period - self._told > self._share() or (self._changed and self._burst):
             self._told = now  # the next time would be too late
             places.update(self._peers())
@@ -111,9 +121,13 @@ class Announcer(Timed):
         """The longest time in which those known have to be told once."""
         return min(self._data.lease, self._settings.lease) // SHARE
 
-    def tell(self, peer: Peer) -> None:
-        """Announce it to one alone."""
-        self._announce(peer.discovery)
+    def tell(self, peer: Peer, now: int) -> None:
+        """Announce it to one alone, unless it was just announced to somebody at the same place."""
+        places = [place for place in peer.discovery if now - self._told_at.get(place, -NEVER) >= PAUSE]
+        if len(self._told_at) > PLACES_MOST:
+            self._told_at.clear()
+        self._told_at.update(dict.fromkeys(places, now))
+        self._announce(places)
 
     def leave(self, *, again: bool = False) -> None:
         """The participant goes. again: it has gone, and those known are told once more."""
@@ -155,7 +169,8 @@ class Welcome(Timed):
 
     def add(self, peer: Peer, now: int) -> None:
         """Somebody new is there."""
-        self._announcer.tell(peer)
+        if not self._is_known_at(peer):
+            self._announcer.tell(peer, now)
         self._due += [(now + offset, peer) for offset in AGAIN]
         self._agenda.at(self, now + AGAIN[0])
 
@@ -168,6 +183,16 @@ class Welcome(Timed):
         ]
         for at, peer in self._due:
             if at <= now:
-                self._announcer.tell(peer)
+                self._announcer.tell(peer, now)
         self._due = [(at, peer) for at, peer in self._due if at > now]
         return min((at for at, _ in self._due), default=NEVER)
+
+    def _is_known_at(self, peer: Peer) -> bool:
+        """Whether another participant of the same process knows of ours: what one hears, all know."""
+        return peer.kin and any(
+            other is not peer
+            and other.kin
+            and other.discovery == peer.discovery
+            and self._knows(other.prefix)
+            for other in self._announcer.peers.values()
+        )

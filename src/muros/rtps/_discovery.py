@@ -95,7 +95,7 @@ class Discovery(Timed):
         self._readers: dict[EntityId, ReaderPort] = {}
         self._paused: dict[GuidPrefix, None] = {}
         settings = self._domain.settings
-        send = self._domain.gatherer(owner.prefix, owner.send)
+        send = owner.gathered_send
         lasts = self._domain.lasts(owner.prefix) or (0,) * len(_WRITERS)
         for (writer, reader, _, _), last in zip(_WRITERS, lasts, strict=True):
             writing = self._writers[writer] = WriterPort(
@@ -126,30 +126,50 @@ class Discovery(Timed):
 
     def meet(self, peer: Peer, now: int) -> None:
         """Somebody is there, or can be reached elsewhere than before."""
-        if peer.prefix not in self.known:
+        known = self.known.get(peer.prefix)
+        elder = None
+        if known is None:
             settings = self._domain.settings
-            self.known[peer.prefix] = Known(
-                peer, Budget(settings.changes_burst, settings.changes_per_second, now)
-            )
+            known = Known(peer, Budget(settings.changes_burst, settings.changes_per_second, now))
+            if peer.kin:
+                elder = self._domain.elder(self._owner, peer.prefix)
+            self.known[peer.prefix] = known
         has = peer.data.builtin_endpoints
         for writer, reader, announcer, detector in _WRITERS:
             if has & detector:
                 port, remote = self._writers[writer], guid_of(peer.prefix, reader)
-                port.core.match(remote, peer.discovery, now, reliable=True, transient_local=True)
+                port.core.match(
+                    remote, peer.discovery, now, reliable=True, transient_local=True, patient=peer.kin
+                )
                 self._domain.add_reply_route(remote, port)
                 self._domain.agenda.at(port, port.core.due)
             if has & announcer:
                 listener, remote = self._readers[writer], guid_of(peer.prefix, writer)
                 listener.core.match_writer(
-                    remote, peer.discovery, now, reliable=True, hello_base=peer.hello_base
+                    remote,
+                    peer.discovery,
+                    now,
+                    reliable=True,
+                    hello_base=peer.hello_base,
+                    patient=peer.kin,
+                    known=0 if elder is None else elder.known_from(remote),
                 )
                 self._domain.add_route(remote, listener)
                 self._domain.agenda.at(listener, listener.core.due)
+        if elder is not None:
+            self._inherit(known, elder, now)
+
+    def known_from(self, writer: Guid) -> int:
+        """Everything up to this sample of somebody's writer of endpoints was heard; 0 = nothing to rely on."""
+        entity = split_guid(writer)[1]
+        if entity == ENTITYID_PARTICIPANT_MESSAGE_WRITER:
+            return 0
+        return self._readers[entity].core.known_from(writer)
 
     def is_heard_by(self, prefix: GuidPrefix) -> bool:
         """Whether somebody's reader of our writers has answered, and so knows of us."""
-        readers = self._writers[ENTITYID_SEDP_PUBLICATIONS_WRITER].core.readers
-        return any(reader.prefix == prefix and reader.count is not None for reader in readers)
+        core = self._writers[ENTITYID_SEDP_PUBLICATIONS_WRITER].core
+        return core.is_heard_by(guid_of(prefix, ENTITYID_SEDP_PUBLICATIONS_READER))
 
     def part(self, prefix: GuidPrefix, why: Why, now: int) -> None:
         """Somebody is there no more, and so are its endpoints."""
@@ -200,6 +220,18 @@ class Discovery(Timed):
     def _write(self, port: WriterPort, payload: bytes, inline_qos: bytes, instance: bytes, now: int) -> None:
         port.core.write(payload, now, inline_qos=inline_qos, instance=instance, last=not payload)
         self._domain.agenda.at(port, port.core.due)
+
+    def _inherit(self, known: Known, elder: "Discovery", now: int) -> None:
+        """Learn of a peer's endpoints what an older participant of this process has heard."""
+        heard = elder.known[known.peer.prefix]
+        for writer, is_writer in (
+            (ENTITYID_SEDP_PUBLICATIONS_WRITER, True),
+            (ENTITYID_SEDP_SUBSCRIPTIONS_WRITER, False),
+        ):
+            if elder.known_from(guid_of(known.peer.prefix, writer)):
+                for guid, endpoint in tuple(heard.endpoints.items()):
+                    if endpoint.is_writer == is_writer:
+                        self._learn(known, endpoint, heard.sizes[guid], now)
 
     # --- Theirs ------------------------------------------------------------------------------------------
 

@@ -21,12 +21,13 @@ from typing import Any, Final
 
 from muros.rtps._agenda import Agenda
 from muros.rtps._constants import ENTITYID_SPDP_WRITER
+from muros.rtps._discovery import Discovery
 from muros.rtps._discovery_data import EndpointData, InvalidDiscoveryData, ParticipantData
 from muros.rtps._domain_settings import DOMAIN_DEFAULTS, NOWHERE, Addresses, DomainSettings, Transmit
 from muros.rtps._endpoint import MILLISECOND, SECOND, Send
 from muros.rtps._events import AckNack, Data, Event, InfoReply, InvalidMessage, NackFrag
 from muros.rtps._farewell import Farewell
-from muros.rtps._gather import Gather
+from muros.rtps._gather import SIZE, Gather
 from muros.rtps._liveliness import WriterLease
 from muros.rtps._news import DomainProblem, DomainReport, ParticipantEvent, Why
 from muros.rtps._others import Others
@@ -277,10 +278,11 @@ class DomainCore:
         gather, others = self._gather, self.others
 
         def collect(submessages: list[bytes], destination: GuidPrefix | None, place: Any) -> None:
-            if self._reply is not None and self._reply[0] == destination:
+            if place is INSIDE or (self._reply is not None and self._reply[0] == destination):
                 send(submessages, destination, place)
             else:
-                gather.add(prefix, submessages, destination, place, place in others.kin)
+                size = others.kin.get(place)
+                gather.add(prefix, submessages, destination, place, size is not None, size or SIZE)
 
         return collect
 
@@ -297,6 +299,11 @@ class DomainCore:
     def lasts(self, prefix: GuidPrefix) -> tuple[int, ...]:
         """What `ended` was told of this one; nothing where it was not here yet."""
         return self._lives.get(prefix, ())
+
+    def elder(self, participant: ParticipantCore, prefix: GuidPrefix) -> "Discovery | None":
+        """The discovery of another participant of this process that has met the one with this prefix."""
+        others = (other for other in self._participants.values() if other is not participant)
+        return next((found for other in others if (found := other.discovery_of(prefix)) is not None), None)
 
     def number(self) -> int:
         """The number of a new announcement.

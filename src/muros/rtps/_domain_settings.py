@@ -67,11 +67,13 @@ class DomainSettings:
     reader: ReaderSettings = READER_DEFAULTS
     discovery_writer: WriterSettings = field(
         default_factory=lambda: WriterSettings(
-            fragment_size=1300, heartbeat_period=100 * MILLISECOND, together=True
+            fragment_size=1300, heartbeat_period=100 * MILLISECOND, together=5 * MILLISECOND
         )
     )
     """Of the writers that tell of endpoints; one datagram of theirs has to pass every network."""
-    discovery_reader: ReaderSettings = field(default_factory=lambda: ReaderSettings(memory=8 << 20))
+    discovery_reader: ReaderSettings = field(
+        default_factory=lambda: ReaderSettings(memory=8 << 20, together=10 * MILLISECOND)
+    )
 
     def __post_init__(self) -> None:
         for name in (

@@ -11,7 +11,18 @@ from typing import Final, Protocol, TypeAlias
 
 from muros.rtps._values import Guid, GuidPrefix
 
-__all__ = ["MILLISECOND", "NEVER", "SECOND", "Place", "Problem", "Report", "Send", "first_count", "newer"]
+__all__ = [
+    "MILLISECOND",
+    "NEVER",
+    "SECOND",
+    "Place",
+    "Problem",
+    "Report",
+    "Send",
+    "first_count",
+    "newer",
+    "next_slot",
+]
 
 MILLISECOND: Final = 10**6
 """In ns, the unit of all times here."""
@@ -80,6 +91,11 @@ def first_count(now: int) -> int:
     They follow the clock, since peers may remember those of an earlier life of the same GUID.
     """
     return now // COUNT_UNIT & 0x3FFFFFFF
+
+
+def next_slot(now: int, width: int) -> int:
+    """The next time after `now` that is a multiple of `width`: what waits for it leaves together."""
+    return now - now % width + width
 
 
 def newer(count: int, than: int | None) -> bool:

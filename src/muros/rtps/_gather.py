@@ -11,10 +11,13 @@ from typing import Final
 from muros.rtps._values import GuidPrefix, Locator
 from muros.rtps._wire import info_dst, info_src, message
 
-__all__ = ["Gather"]
+__all__ = ["SIZE", "SIZE_HERE", "Gather"]
 
 SIZE: Final = 1300
-"""Bytes that are sent together; what is larger goes alone."""
+"""Bytes that are sent together over a network; what is larger goes alone."""
+
+SIZE_HERE: Final = 16384
+"""The same to a place on this host, where nothing cuts datagrams to pieces."""
 
 EVERYBODY: Final = bytes(12)
 """As destination: whoever listens."""
@@ -39,12 +42,13 @@ class Gather:
         destination: GuidPrefix | None,
         place: Locator,
         joint: bool,
+        size: int = SIZE,
     ) -> None:
-        """Send these of the participant `prefix`; joint: together with those of others."""
+        """Send these of the participant `prefix`. joint: together with those of others, up to `size` bytes."""
         key = (EVERYBODY if joint else prefix), place
         bundle = self.pending.get(key)
-        size = sum(map(len, submessages)) + INFO_SIZE
-        if bundle is not None and bundle.size + size > SIZE:
+        added = sum(map(len, submessages)) + INFO_SIZE
+        if bundle is not None and bundle.size + added > size:
             self._let_go(key)
             bundle = None
         if bundle is None:

@@ -79,7 +79,7 @@ class LocalWriter(WriterPort):
         super().__init__(
             WriterCore(
                 data.guid,
-                owner.send,
+                owner.gathered_send if settings.together else owner.send,
                 reliable=qos.reliable,
                 transient_local=qos.durability > 0,
                 depth=None if qos.history == History.KEEP_ALL else max(1, qos.depth),
@@ -319,7 +319,7 @@ class LocalReader(ReaderPort):
         super().__init__(
             ReaderCore(
                 data.guid,
-                owner.send,
+                owner.gathered_send if settings.together else owner.send,
                 self._deliver,
                 reliable=qos.reliable,
                 settings=settings,

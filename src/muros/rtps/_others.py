@@ -7,10 +7,11 @@ known, and how often one may say something else, is limited.
 
 from typing import TYPE_CHECKING, Final
 
-from muros.rtps._constants import PROTOCOL_VERSION, VENDOR_OURS, StatusInfo
+from muros.rtps._constants import PROTOCOL_VERSION, StatusInfo
 from muros.rtps._discovery_data import InvalidDiscoveryData, ParticipantData, key_untrusted
 from muros.rtps._endpoint import MILLISECOND, SECOND
 from muros.rtps._events import Data
+from muros.rtps._gather import SIZE, SIZE_HERE
 from muros.rtps._news import DomainProblem, Why
 from muros.rtps._parameters import InvalidParameters, status_info
 from muros.rtps._peer import Budget, Peer
@@ -50,8 +51,8 @@ class Others:
     def __init__(self, home: "DomainCore") -> None:
         self._home = home
         self.peers: Final[dict[GuidPrefix, Peer]] = {}
-        self.kin: frozenset[Locator] = frozenset()
-        """Where those of them listen that are of this kind."""
+        self.kin: dict[Locator, int] = {}
+        """Where those of them listen that are of this kind, and how many bytes of discovery go there together."""
         self._gone: dict[GuidPrefix, tuple[int, int]] = {}
         self._look_at = 0
 
@@ -171,12 +172,13 @@ class Others:
             self._home.report(DomainProblem.UNREACHABLE, peer.prefix, len(offered), addresses, peer.source)
 
     def _find_kin(self) -> None:
-        self.kin = frozenset(
-            place
+        hosts = self._home.hosts
+        self.kin = {
+            place: SIZE_HERE if hosts.has(place) else SIZE
             for peer in self.peers.values()
-            if peer.data.vendor == VENDOR_OURS
+            if peer.kin
             for place in peer.discovery
-        )
+        }
 
     def _departed(self, guid: Guid, event: Data, now: int) -> None:
         prefix = event.source

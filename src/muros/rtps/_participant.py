@@ -74,6 +74,8 @@ class ParticipantCore:
         """Not yet there for others, since they are still told that an earlier life has gone."""
         self.send = home.sender(self.prefix)
         """For its cores."""
+        self.gathered_send = home.gatherer(self.prefix, self.send)
+        """For those that may wait a little to be sent together."""
         self._writers: dict[EntityId, LocalWriter] = {}
         self._readers: dict[EntityId, LocalReader] = {}
         self._locals: dict[str, list[LocalWriter | LocalReader]] = {}
@@ -83,7 +85,7 @@ class ParticipantCore:
         self._discovery = Discovery(self)
         self._announcer = Announcer(
             data,
-            home.gatherer(self.prefix, self.send),
+            self.gathered_send,
             home.settings,
             home.addresses.announce_to,
             home.peers,
@@ -264,6 +266,10 @@ class ParticipantCore:
         self._discovery.close()
         for timed in (self._announcer, self._welcome, self._automatic, self._manual):
             self.home.agenda.forget(timed)
+
+    def discovery_of(self, prefix: GuidPrefix) -> Discovery | None:
+        """Its discovery, if it has met somebody."""
+        return self._discovery if prefix in self._discovery.known else None
 
     def knows_endpoints_of(self, prefix: GuidPrefix) -> bool:
         """Whether somebody has told of writers or readers."""
@@ -460,6 +466,7 @@ class ParticipantCore:
                 transient_local=remote.qos.durability >= Durability.TRANSIENT_LOCAL,
                 expects_inline_qos=remote.expects_inline_qos
                 or (peer is not None and peer.data.expects_inline_qos),
+                patient=peer is not None and peer.kin,
             )
         else:
             local.add(remote)
@@ -472,6 +479,7 @@ class ParticipantCore:
                 now,
                 reliable=remote.qos.reliable,
                 hello_base=1 if peer is None else peer.hello_base,
+                patient=peer is not None and peer.kin,
             )
         home.agenda.at(local, local.core.due)
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from muros.rtps._agenda import Timed
-from muros.rtps._constants import VENDOR_EPROSIMA
+from muros.rtps._constants import VENDOR_EPROSIMA, VENDOR_OURS
 from muros.rtps._discovery_data import EndpointData, ParticipantData
 from muros.rtps._endpoint import NEVER, SECOND
 from muros.rtps._reach import Hosts
@@ -57,6 +57,11 @@ class Peer(Timed):
     def prefix(self) -> GuidPrefix:
         """Its GUID prefix."""
         return self.data.prefix
+
+    @property
+    def kin(self) -> bool:
+        """Whether it is of this kind: then its process is one with sockets for all its participants, and patient."""
+        return self.data.vendor == VENDOR_OURS
 
     @property
     def hello_base(self) -> int:

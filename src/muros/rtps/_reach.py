@@ -44,6 +44,10 @@ class Hosts:
         )
         self._kinds = frozenset({UDP4, *(kind for kind, _ in self._ours)})
 
+    def has(self, at: Locator) -> bool:
+        """Whether this is a place on this host."""
+        return is_loopback(at) or (at.kind, at.address) in self._ours
+
     def choose(self, offered: Iterable[Locator], source: Locator | None) -> tuple[Locator, ...]:
         """The one of `offered` to send to, nothing when none can be reached. `source`: where the peer spoke from.
 

@@ -21,7 +21,7 @@ so that a writer that keeps all stops, until `resume`.
 from collections.abc import Iterable
 from typing import Final, Protocol
 
-from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, first_count, newer
+from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, first_count, newer, next_slot
 from muros.rtps._fragments import FRAGMENT_COST, Assembly, fragments_of
 from muros.rtps._parameters import key_hash_of
 from muros.rtps._settings import READER_DEFAULTS, ReaderSettings
@@ -36,6 +36,9 @@ SAMPLE_COST: Final = 500
 
 NACK_FRAGS_MOST: Final = 8
 """Incomplete samples whose fragments are asked for at once."""
+
+PATIENT_HELLO: Final = 8
+"""Hello periods that a patient writer is given to speak first."""
 
 ASSEMBLIES_MOST: Final = 8
 """Samples of one best-effort writer put together at the same time."""
@@ -107,12 +110,22 @@ class ReaderCore:
         return sum(proxy.held for proxy in self._proxies.values())
 
     def match_writer(
-        self, writer: Guid, places: Iterable[Place], now: int, *, reliable: bool, hello_base: int = 1
+        self,
+        writer: Guid,
+        places: Iterable[Place],
+        now: int,
+        *,
+        reliable: bool,
+        hello_base: int = 1,
+        patient: bool = False,
+        known: int = 0,
     ) -> None:
         """Samples of this writer are wanted from now on (8.4.10.1); what is said to it goes to each of `places`.
 
-        hello_base: where the numbers begin in the ACKNACK that asks for nothing but a HEARTBEAT. For a writer that is
-        matched already only the places are changed; it is then asked anew what it has.
+        hello_base: where the numbers begin in the ACKNACK that asks for nothing but a HEARTBEAT. patient: the writer
+        sends one by itself, and may be answered together with others (`ReaderSettings.together`). known: samples up
+        to this one are here already. For a writer that is matched already only the places are changed; it is then
+        asked anew what it has.
         """
         key = split_guid(writer)
         proxy = self._proxies.get(key)
@@ -125,8 +138,23 @@ class ReaderCore:
         proxy = self._proxies[key] = WriterProxy(*key, tuple(places), self.reliable and reliable)
         proxy.hello_base = hello_base
         proxy.sent_count = proxy.sent_fragment_count = first_count(now)
-        if proxy.reliable:
+        proxy.patient = patient and self.settings.together > 0
+        if proxy.reliable and known:
+            proxy.expected = known + 1
+            proxy.last = known
+            self._send_to(proxy, [self._acknack(proxy, [], final=True)])
+        elif proxy.reliable and proxy.patient:
+            proxy.hello_at = now + PATIENT_HELLO * self.settings.hello_period
+            self._wake(proxy, proxy.hello_at)
+        elif proxy.reliable:
             self._hello(proxy, now)
+
+    def known_from(self, writer: Guid) -> int:
+        """Everything up to this sample of a reliable writer was delivered and nothing waits; 0 = nothing is sure."""
+        proxy = self._proxies.get(split_guid(writer))
+        if proxy is None or not proxy.reliable or proxy.paused or proxy.pending or proxy.count is None:
+            return 0
+        return proxy.expected - 1
 
     def unmatch_writer(self, writer: Guid) -> None:
         """The writer has gone or no longer fits; what had come too early is dropped."""
@@ -453,6 +481,8 @@ class ReaderCore:
 
     def _answer_soon(self, proxy: WriterProxy, now: int) -> None:
         at = now + self.settings.response_delay
+        if proxy.patient:
+            at = next_slot(at, self.settings.together)
         if proxy.asked_to >= proxy.expected and not proxy.progress:
             at = max(at, proxy.asked_at + self.settings.hold_off)
         if at <= now:

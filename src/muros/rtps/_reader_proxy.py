@@ -12,7 +12,8 @@ class ReaderProxy:
     """One matched reader: where it is, what it has, what it wants again."""
 
     __slots__ = (
-        "acked", "aside", "count", "due", "entity", "fragment_count", "inline_qos", "interval", "places", "prefix",
+        "acked", "aside", "count", "due", "entity", "fragment_count", "inline_qos", "interval", "patient", "places",
+        "prefix",
         "reliable", "repaired", "repaired_at", "since", "start", "wanted",
     )  # fmt: skip
 
@@ -25,6 +26,8 @@ class ReaderProxy:
         self.reliable = reliable
         self.inline_qos = False
         """Whether it wants the endpoint's QoS with every sample."""
+        self.patient = False
+        """It may be served a little later, together with others."""
         self.start = start
         """The first sample meant for it."""
         self.acked = start - 1

@@ -102,12 +102,23 @@ class Repairs:
             self.waiting[proxy] = None
         return bool(fragments)
 
+    def offer(self, proxy: ReaderProxy, lowest: int, sent: int, now: int) -> None:
+        """A reader has come that has not asked yet: it wants what is kept."""
+        if proxy.acked < sent:
+            proxy.repaired_at = now
+            for number in range(max(proxy.start, lowest), min(sent, proxy.start + WANTED_MOST) + 1):
+                if self._history.get(number) is not None:
+                    proxy.wanted[number] = None
+                    proxy.repaired.add(number)
+        self.waiting[proxy] = None
+
     def drop(self, proxy: ReaderProxy) -> None:
         """The reader has everything, or is gone."""
         self.waiting.pop(proxy, None)
 
-    def run(self, now: int, heartbeat: Callable[[ReaderProxy], bytes]) -> None:
-        """Send again what the allowance has room for."""
+    def run(self, now: int, heartbeat: Callable[[ReaderProxy], bytes]) -> list[ReaderProxy]:
+        """Send again what the allowance has room for; returns the patient readers that a heartbeat is due to."""
+        served = []
         if self._together and len(self.waiting) > 1:
             self._send_to_all(now)
         for proxy in tuple(self.waiting):
@@ -129,8 +140,12 @@ class Repairs:
                 packet.add(submessage)
             if not proxy.wanted:
                 del self.waiting[proxy]
-                packet.add(heartbeat(proxy))
+                if proxy.patient:
+                    served.append(proxy)
+                else:
+                    packet.add(heartbeat(proxy))
             packet.flush()
+        return served
 
     def _send_to_all(self, now: int) -> None:
         """Send what several readers at one place miss to everybody there."""

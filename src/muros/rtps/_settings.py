@@ -33,9 +33,10 @@ class WriterSettings:
     """What was sent again to a reader is not sent once more to it within this time."""
     window: int = 1 << 20
     """Bytes that may be on their way to reliable readers, at most; fewer while any of them get lost."""
-    together: bool = False
-    """What readers have missed is sent by the next `tick`, due at once, what several at one place have missed to all of
-    them at once. Only for writers whose readers all want what is kept, such as those of discovery."""
+    together: int = 0
+    """Readers are served together: what several at one place miss goes to all of them at once, by a `tick` that is
+    due at once, or for patient ones (`WriterCore.match`) at the next multiple of this time. 0 = each by itself. Only
+    for writers whose readers all want what is kept, such as those of discovery."""
     burst: int = 256 * 1024
     """Bytes of repairs and of fragments that are not within the window, sent in one go."""
     pace: int = MILLISECOND
@@ -56,10 +57,11 @@ class WriterSettings:
         ):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
-        if self.fragment_size > 65000 or self.hold_off < 0 or self.limit_of_one < 0:
-            raise ValueError(
-                "fragment_size must be at most 65000 bytes, and hold_off and limit_of_one not negative"
-            )
+        for name in ("limit_of_one", "hold_off", "together"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must not be negative")
+        if self.fragment_size > 65000:
+            raise ValueError(f"fragment_size is {self.fragment_size}; it must be at most 65000")
 
 
 WRITER_DEFAULTS: Final = WriterSettings()
@@ -80,6 +82,9 @@ class ReaderSettings:
     """Bytes held for one writer: samples that came early, and those being put together. No larger one can come."""
     response_delay: int = 0
     """A heartbeat is answered after this time, together with those that follow it."""
+    together: int = 0
+    """Heartbeats of patient writers (`ReaderCore.match_writer`) are answered at the next multiple of this time, as
+    all readers do, so that the answers may share datagrams; 0 = as others."""
     hold_off: int = 10 * MILLISECOND
     """What is missing is asked for when it has been overtaken by this time, and again after this time, or when some
     of it has come; the pause doubles while nothing comes."""
@@ -98,7 +103,7 @@ class ReaderSettings:
         for name in ("window", "memory", "hold_off", "slowest", "hello_period", "hellos", "assembly_time"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
-        for name in ("response_delay", "asks", "limit", "limit_of_one"):
+        for name in ("response_delay", "together", "asks", "limit", "limit_of_one"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must not be negative")
 

@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable
 from typing import Final
 
 from muros.rtps._constants import ENTITYID_UNKNOWN
-from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, first_count, newer
+from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, first_count, newer, next_slot
 from muros.rtps._fragments import fragments_of
 from muros.rtps._history import Sample
 from muros.rtps._keeping import Keeper
@@ -131,7 +131,7 @@ class WriterCore:
             self._allowance,
             settings.fragment_size,
             settings.hold_off,
-            together=settings.together,
+            together=settings.together > 0,
         )
         self._count = 0
         self._ask_at = 0
@@ -151,6 +151,11 @@ class WriterCore:
     def readers(self) -> tuple[ReaderProxy, ...]:
         """The matched readers."""
         return tuple(self._proxies.values())
+
+    def is_heard_by(self, reader: Guid) -> bool:
+        """Whether a matched reader has answered."""
+        proxy = self._proxies.get(split_guid(reader))
+        return proxy is not None and proxy.count is not None
 
     @property
     def held(self) -> int:
@@ -175,8 +180,10 @@ class WriterCore:
         reliable: bool,
         transient_local: bool = False,
         expects_inline_qos: bool = False,
+        patient: bool = False,
     ) -> None:
-        """A reader wants the samples from now on (8.4.9.1.1); `transient_local`: those kept, too.
+        """A reader wants the samples from now on (8.4.9.1.1); `transient_local`: those kept, too. patient: it may be
+        told a little later, together with others (`WriterSettings.together`), and is given what is kept unasked.
 
         Everything for it goes to each of `places`. For a reader that is matched already only they are changed; it is
         then told anew what there is.
@@ -197,6 +204,7 @@ class WriterCore:
             start = self._lowest()
         proxy = self._proxies[key] = ReaderProxy(*key, tuple(places), self.reliable and reliable, start)
         proxy.inline_qos = expects_inline_qos
+        proxy.patient = patient and self.settings.together > 0
         self._reroute()
         if proxy.reliable:
             lags = proxy.acked < self.sent
@@ -204,7 +212,11 @@ class WriterCore:
                 self._now_lags(proxy, now)
             else:
                 self._idle[proxy] = None
-            self._send_heartbeat(proxy, final=not lags)
+            if proxy.patient:
+                self._repairs.offer(proxy, self._lowest(), self.sent, now)
+                self._repair_soon(proxy, now)
+            else:
+                self._send_heartbeat(proxy, final=not lags)
 
     def unmatch(self, reader: Guid, now: int) -> None:
         """The reader has gone or no longer fits; nothing happens when it is not matched."""
@@ -297,7 +309,10 @@ class WriterCore:
         if missed:
             self._lost(now)
         if answered:
-            self._repair_soon(now)
+            self._repair_soon(proxy, now)
+        elif not event.final and proxy.patient:
+            self._repairs.waiting[proxy] = None
+            self._repair_soon(proxy, now)
         elif not event.final:
             # One that is not final asks for an answer. The answer must not ask back when nothing has changed:
             # two such sides would not come to rest.
@@ -327,7 +342,7 @@ class WriterCore:
         if proxy.acked < event.sequence <= self.sent:
             if self._repairs.want_fragments(proxy, event):
                 self._lost(now)
-            self._repair_soon(now)
+            self._repair_soon(proxy, now)
 
     def assert_liveliness(self, now: int) -> None:
         """Say that a writer with manual liveliness is alive (8.3.7.5: HEARTBEAT with the liveliness flag)."""
@@ -447,14 +462,16 @@ class WriterCore:
         if not repairs.waiting:
             self._repair_at = NEVER
             return
-        repairs.run(now, self._asking_heartbeat)
+        self._ask_together(repairs.run(now, self._asking_heartbeat))
         self._repair_at = now + self.settings.pace if repairs.waiting else NEVER
         self.due = min(self.due, self._repair_at)
 
-    def _repair_soon(self, now: int) -> None:
+    def _repair_soon(self, proxy: ReaderProxy, now: int) -> None:
         """Send what a reader wants; with what others are about to want, if they are served together."""
-        if self.settings.together:
-            self._repair_at = self.due = now
+        together = self.settings.together
+        if together:
+            self._repair_at = min(self._repair_at, next_slot(now, together) if proxy.patient else now)
+            self.due = min(self.due, self._repair_at)
         else:
             self._repair(now)
 
@@ -521,8 +538,10 @@ class WriterCore:
     def _beat(self, due: list[ReaderProxy], now: int) -> None:
         """Ask lagging readers for acknowledgement, those of one participant together."""
         groups: dict[tuple[GuidPrefix, tuple[Place, ...]], list[ReaderProxy]] = {}
+        self._ask_together([proxy for proxy in due if proxy.patient])
         for proxy in due:
-            groups.setdefault((proxy.prefix, proxy.places), []).append(proxy)
+            if not proxy.patient:
+                groups.setdefault((proxy.prefix, proxy.places), []).append(proxy)
             proxy.interval = min(proxy.interval * 2, self.settings.heartbeat_slowest)
             proxy.due = now + proxy.interval
         for (prefix, places), proxies in groups.items():
@@ -534,6 +553,26 @@ class WriterCore:
             beat = heartbeat(ENTITYID_UNKNOWN, self._entity, first, self.sent, self._count)
             for place in places:
                 self._send([beat], prefix, place)
+
+    def _ask_together(self, proxies: list[ReaderProxy]) -> None:
+        """Tell patient readers what there is, and ask those that lag: all at one place at once, if most are meant."""
+        by_place: dict[tuple[Place, ...], list[ReaderProxy]] = {}
+        for proxy in proxies:
+            by_place.setdefault(proxy.places, []).append(proxy)
+        for places, meant in by_place.items():
+            # One that was never heard of is asked to answer even when there is nothing it could miss.
+            final = all(proxy in self._idle and proxy.count is not None for proxy in meant)
+            there = sum(proxy.places == places for proxy in self._proxies.values())
+            if len(meant) > 1 and 2 * len(meant) > there:
+                self._count += 1
+                beat = heartbeat(
+                    ENTITYID_UNKNOWN, self._entity, self._lowest(), self.sent, self._count, final=final
+                )
+                for place in places:
+                    self._send([beat], None, place)
+            else:
+                for proxy in meant:
+                    self._send_heartbeat(proxy, final=proxy in self._idle and proxy.count is not None)
 
     # --- Readers -----------------------------------------------------------------------------------------
 

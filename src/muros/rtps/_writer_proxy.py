@@ -14,7 +14,7 @@ class WriterProxy:
     __slots__ = (
         "answer_at", "asked_at", "asked_to", "asks", "assemblies", "came", "count", "entity", "expected",
         "floor", "fragment_at", "fragment_count", "guid", "held", "hello_at", "hello_base", "hellos", "irrelevant",
-        "last", "owes", "paused", "pending", "places", "prefix", "progress", "reliable", "sent_count",
+        "last", "owes", "patient", "paused", "pending", "places", "prefix", "progress", "reliable", "sent_count",
         "sent_fragment_count", "skip",
     )  # fmt: skip
 
@@ -26,6 +26,8 @@ class WriterProxy:
         self.entity = entity
         self.places = places
         self.reliable = reliable
+        self.patient = False
+        """It may be answered a little later, together with others."""
         self.expected = 1
         """The next sample to deliver."""
         self.last = 0

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from muros.rtps import LocalReader, Received
+from muros.rtps import LocalReader, ReaderSettings, Received, WriterSettings
 from muros.space._graph import Appeared, Vanished
 from muros.space._participant import READER_KIND, WRITER_KIND
 from muros.space._timers import Timer
@@ -40,6 +40,10 @@ NUMBER: Final = 0xFFFFFF
 WRITER: Final = NUMBER << 8 | WRITER_KIND
 READER: Final = NUMBER << 8 | READER_KIND
 
+INFO_WRITER: Final = WriterSettings(heartbeat_period=50_000_000, together=5_000_000)
+INFO_READER: Final = ReaderSettings(together=10_000_000)
+"""Where processes of many nodes meet, what they tell each other shares datagrams."""
+
 
 class Nodes:
     """The nodes of a domain."""
@@ -66,6 +70,7 @@ class Nodes:
                 *INFO_TOPIC,
                 to_wire(INFO_QOS, home.core.limits),
                 now=home.now(),
+                settings=INFO_WRITER,
                 entity=WRITER,
                 last=home.recall(participant.gid[:12] + WRITER.to_bytes(4, "big")),
             )
@@ -83,7 +88,9 @@ class Nodes:
         """Hear of others' nodes, through this participant of ours."""
         home = self._home
         qos = to_wire(INFO_QOS, home.core.limits)
-        self._reader = participant.rtps.reader(*INFO_TOPIC, qos, self._hear, now=home.now(), entity=READER)
+        self._reader = participant.rtps.reader(
+            *INFO_TOPIC, qos, self._hear, now=home.now(), entity=READER, settings=INFO_READER
+        )
 
     def listen_no_more(self) -> None:
         """The participant that listened goes."""
