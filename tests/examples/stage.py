@@ -1,0 +1,131 @@
+"""Where the examples are run: as processes of CPython or MicroPython, through an agent or straight in the graph."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from muros.links import Link, UdpLink
+from tests.client.agent_thread import RunningAgent
+from tests.dds.domains import Domain
+from tests.micropython.runtimes import UNIX
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
+PATIENCE = 30.0
+"""Seconds until what must come has come."""
+
+TYPES = (
+    "std_msgs/msg/Int32",
+    "std_msgs/msg/String",
+    "std_msgs/msg/UInt8MultiArray",
+    "sensor_msgs/msg/JointState",
+    "example_interfaces/srv/AddTwoInts",
+)
+"""What the examples import on boards."""
+
+
+class Program:
+    """An example that runs, and what it prints."""
+
+    def __init__(self, name: str, words: list[str], environment: dict[str, str], micropython: bool) -> None:
+        self.name = name
+        interpreter = [str(UNIX)] if micropython else [sys.executable, "-u"]
+        self.lines: list[str] = []
+        self.process = subprocess.Popen(
+            [*interpreter, str(EXAMPLES / f"{name}.py"), *words],
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip("\r\n"))
+
+    def ends(self, number: int | None = None) -> None:
+        """Waits for its end, with a signal first if one is given; it ends well and has complained of nothing."""
+        if number is not None:
+            self.process.send_signal(number)
+        status = self.process.wait(PATIENCE)
+        self._reader.join(PATIENCE)
+        assert self.process.stderr is not None
+        assert (status, self.process.stderr.read()) == (0, ""), self.lines
+
+    def kill(self) -> None:
+        """Ends it whatever happened."""
+        self.process.kill()
+        self.process.wait()
+        self._reader.join(PATIENCE)
+        for stream in (self.process.stdout, self.process.stderr):
+            assert stream is not None
+            stream.close()
+
+
+class Stage:
+    """A domain, an agent for those who need one, and the programs that run."""
+
+    def __init__(self, board: Path, domain: Domain) -> None:
+        self.domain = domain
+        self.environment = {
+            key: value
+            for key, value in os.environ.items()
+            if not key.startswith(("ROS_", "RMW_", "MUROS_", "MICROPY"))
+        }
+        self.environment.update(ROS_DOMAIN_ID=str(int(domain)), ROS_AUTOMATIC_DISCOVERY_RANGE="LOCALHOST")
+        self.board = dict(self.environment, MICROPYPATH=f".frozen:{ROOT / 'src'}:{board}")
+        self.programs: list[Program] = []
+        self.link = UdpLink(0, "127.0.0.1")
+        self.running: RunningAgent | None = None
+
+    def agent(self, *links: Link, space: str = "local:") -> str:
+        """Starts an agent; the way to it."""
+        self.running = RunningAgent(self.link, *links, space=space)
+        return f"udp:127.0.0.1:{self.link.port}"
+
+    def start(self, name: str, *words: object, on: str = "python") -> Program:
+        """Starts an example."""
+        micropython = on == "micropython"
+        program = Program(
+            name, list(map(str, words)), self.board if micropython else self.environment, micropython
+        )
+        self.programs.append(program)
+        return program
+
+    def until(self, condition: Callable[[], Any]) -> None:
+        """Waits for what the programs print."""
+        end = time.monotonic() + PATIENCE
+        while not condition():
+            ended = [p.name for p in self.programs if p.process.poll() not in (None, 0)]
+            said = {program.name: program.lines for program in self.programs}
+            assert not ended, f"{ended} ended: {said}, {self._errors()}"
+            assert time.monotonic() < end, f"it did not come about within {PATIENCE} s: {said}"
+            time.sleep(0.01)
+
+    def _errors(self) -> list[str]:
+        return [
+            p.process.stderr.read()
+            for p in self.programs
+            if p.process.poll() and p.process.stderr is not None
+        ]
+
+    def close(self) -> None:
+        """Ends them all."""
+        for program in self.programs:
+            program.kill()
+        if self.running is not None:
+            self.running.stop()
+
+
+def interrupt(program: Program) -> None:
+    """Ctrl-C ends a program of CPython without a word."""
+    program.ends(signal.SIGINT)

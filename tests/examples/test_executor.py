@@ -1,0 +1,66 @@
+"""The examples of the executor print what they say."""
+
+import pytest
+
+from tests.examples.stage import Program, Stage, interrupt
+from tests.micropython.runtimes import require
+
+RUNS = [("local:", "python"), ("agent", "micropython")]
+
+
+def start(stage: Stage, name: str, place: str, on: str) -> Program:
+    """Starts an example on its own."""
+    if on == "micropython":
+        require("unix")
+    return stage.start(name, stage.agent() if place == "agent" else place, on=on)
+
+
+@pytest.mark.parametrize(("place", "on"), RUNS)
+def test_the_order_of_adding_is_the_order_of_processing(stage: Stage, place: str, on: str) -> None:
+    program = start(stage, "executor_order", place, on)
+    stage.until(lambda: len(program.lines) >= 6)
+    heard = [line for line in program.lines if ":" not in line]
+    if place == "local:":  # both are there before the pass
+        assert program.lines[:6] == ["published: second, first", "first", "second"] * 2
+    assert {"first", "second"} == set(heard)
+    if on == "python":
+        interrupt(program)
+
+
+@pytest.mark.parametrize(("place", "on"), RUNS)
+def test_the_trigger_prints_both_with_the_newest_text(stage: Stage, place: str, on: str) -> None:
+    program = start(stage, "trigger", place, on)
+    stage.until(lambda: len(program.lines) >= 4)
+    for i in range(2):
+        text, number = program.lines[2 * i : 2 * i + 2]
+        assert number == f"Callback 2: I heard: {i}"
+        newest = int(text.removeprefix("Callback 1: I heard: Hello World! "))
+        assert newest >= 10 * i + 9, "older texts were dropped"
+
+
+@pytest.mark.parametrize(("place", "on"), RUNS)
+def test_timers(stage: Stage, place: str, on: str) -> None:
+    program = start(stage, "timers", place, on)
+    program.ends()
+    assert program.lines == ["slow 1", "slow 2", "fast 1", "fast 2", "fast 3", "over"]
+
+
+@pytest.mark.parametrize(("place", "on"), RUNS)
+def test_subscriptions_with_something_of_their_own(stage: Stage, place: str, on: str) -> None:
+    program = start(stage, "subscription_with_context", place, on)
+    stage.until(lambda: len(program.lines) >= 4)
+    for side in ("left", "right"):
+        turns = [line for line in program.lines if line.startswith(side)]
+        assert turns[:2] == [f"{side} wheel: 1 turns", f"{side} wheel: 2 turns"]
+
+
+@pytest.mark.parametrize(("place", "on"), RUNS)
+def test_a_short_timer_and_a_long_subscription(stage: Stage, place: str, on: str) -> None:
+    program = start(stage, "short_timer_long_subscription", place, on)
+    works = "subscription works for 250 ms"
+    stage.until(lambda: program.lines.count(works) >= 2)
+    stage.until(lambda: program.lines[-1] != works)
+    at = program.lines.index(works)
+    assert program.lines[at + 1].startswith("timer, ")
+    since = int(program.lines[at + 1].split()[1])
+    assert since >= 250, "it waited for the subscription"
