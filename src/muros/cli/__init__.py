@@ -14,6 +14,10 @@ INTERRUPTED = 130
 
 COMMANDS = {
     "agent": ("muros.cli.agent", "connect DDS-XRCE clients, such as boards that speak micro-ROS"),
+    "rosserial": (
+        "muros.cli.rosserial",
+        "connect boards with rosserial firmware, such as Arduino and OpenCR",
+    ),
     "board": ("muros.cli.board", "write the files that a MicroPython board needs"),
     "interface": ("muros.cli.interface", "show, list and generate message, service and action types"),
     "topic": ("muros.cli.topic", "list, show, publish and measure topics of the ROS 2 graph"),

@@ -32,6 +32,8 @@ class Tap(Link):
 
     def open(self, events: LinkEvents) -> None:
         """Opens the link inside; its events come through here."""
+        if self.on_peer is not None:
+            self.inner.on_peer = self.on_peer
         self.inner.open(_Listener(self, events, self._on_message))
 
     def close(self) -> None:
@@ -42,6 +44,10 @@ class Tap(Link):
         """Shows the message and sends it."""
         self._on_message(self.inner, False, bytes(message), address)
         return self.inner.send(message, address)
+
+    def backlog(self, address: Address) -> int:
+        """What waits in the link inside."""
+        return self.inner.backlog(address)
 
     def describe(self, address: Address) -> str:
         """As the link inside says it."""

@@ -9,6 +9,7 @@ from muros.rosserial.server._door import BodyError, Caller, Node, Publisher, Ref
 from muros.rosserial.server._door import Server as Answerer
 from muros.rosserial.server._limits import Limits
 from muros.rosserial.server._lines import BAUD, BAUDS, TCP_PORT, RawFraming, serial_line, tcp_line
+from muros.rosserial.server._parameters import flat
 from muros.rosserial.server._server import NODE_NAME, Server
 from muros.rosserial.server._space_world import SpaceWorld
 from muros.rosserial.server.events import (
@@ -58,6 +59,7 @@ __all__ = [
     "SpaceWorld",
     "Subscriber",
     "World",
+    "flat",
     "judge",
     "serial_line",
     "tcp_line",

@@ -56,7 +56,8 @@ def identify(link: Link, address: Hashable, name: str, alone: bool) -> Identity:
     """Who is at an address of a link. ``name`` is the full name for nodes; ``alone``: without the line's name."""
     if isinstance(address, LineAddress):
         own = _OWN_RATE.match(os.path.realpath(address.device))
-        baud = link.baud_of(address.device) if isinstance(link, SerialLink) and not own else 0
+        rate = getattr(link, "baud_of", None)  # serial links have one
+        baud = 0 if own or rate is None else rate(address.device)
         node = name if alone else f"{name}_{_token(os.path.basename(address.device))}"
         return Identity(("line", address.device), address.device, node, baud)
     host = str(address[0]) if isinstance(address, tuple) else str(address)

@@ -18,7 +18,7 @@ from dataclasses import replace
 from typing import Any
 
 from muros.findings import Finding, Findings
-from muros.links import LineAddress, Link, LinkError, SerialLink
+from muros.links import LineAddress, Link, LinkError
 from muros.rosserial.server._board import Board
 from muros.rosserial.server._core import ServerCore
 from muros.rosserial.server._limits import Limits
@@ -41,8 +41,9 @@ class Server:
     """A rosserial server. Everything it does happens on the thread of the loop that runs it.
 
     ``space``: a URL (``"dds:"``, the ROS 2 graph; ``"local:"``, only this process) or a space to share with others.
-    ``remap`` gives topics and services other names. ``parameters(node)`` gives the first parameters of the node with
-    that full name. ``limits`` are those of the server; single ``fields`` of `Limits` may be given by name instead.
+    Boards are called ``node_name`` and their line's name, where their link gives them no name. ``remap`` gives topics
+    and services other names. ``parameters(node)`` gives the first parameters of the node with that full name.
+    ``limits`` are those of the server; single ``fields`` of `Limits` may be given by name instead.
     """
 
     def __init__(
@@ -51,6 +52,7 @@ class Server:
         *,
         findings: Findings | None = None,
         domain: int | None = None,
+        node_name: str = NODE_NAME,
         remap: Mapping[str, str] | None = None,
         parameters: Callable[[str], Mapping[str, Any]] | None = None,
         limits: Limits | None = None,
@@ -64,6 +66,7 @@ class Server:
             self.findings = findings or space.findings
             self.space = space
             self._owns_space = False
+        self.node_name = "/" + node_name.strip("/")
         made = replace(limits or Limits(), **fields)
         self._world = SpaceWorld(
             self.space,
@@ -78,7 +81,7 @@ class Server:
         self.core.on_event = self._tell
         self.core.on_wake = self._arm
         self.core.on_unanswered = self._next_baud
-        self._finding_baud: set[Link] = set()
+        self._finding_baud: set[object] = set()
         self.links: list[Link] = []
         self._adapters: dict[Link, _LinkAdapter] = {}
         self._watchers: list[Callable[[Event], object]] = []
@@ -93,21 +96,21 @@ class Server:
         self, devices: str | Sequence[str], baud: int | None = BAUD, *, name: str | None = None
     ) -> Link:
         """Adds serial ports, by path, by-id name or pattern; ``baud`` None: the rate is found out. See `add_link`."""
-        link = serial_line(devices, baud or BAUD)
-        if baud is None:
-            self._finding_baud.add(link)
-        return self.add_link(link, name=name)
+        return self.add_link(serial_line(devices, baud or BAUD), name=name, find_baud=baud is None)
 
     def add_tcp(self, port: int = TCP_PORT, host: str | None = None, *, name: str | None = None) -> Link:
         """Adds a port where boards dial in; see `add_link`."""
         return self.add_link(tcp_line(port, host), name=name)
 
-    def add_link(self, link: Link, *, name: str | None = None) -> Link:
+    def add_link(self, link: Link, *, name: str | None = None, find_baud: bool = False) -> Link:
         """Adds a link without framing (`RawFraming`); it opens when the server runs, or now if it does.
 
-        ``name`` is the full name of the board's node; without one boards are called after their lines. Raises
-        LinkError if it cannot open now.
+        ``name`` is the full name of the board's node; without one boards are called after their lines. With
+        ``find_baud`` other rates are tried on serial lines whose boards do not answer. Raises LinkError if it cannot
+        open now.
         """
+        if find_baud:
+            self._finding_baud.add(link)
         adapter = _LinkAdapter(self, link, name)
         link.on_peer = adapter.on_peer
         if self._loop is not None:
@@ -199,17 +202,16 @@ class Server:
     def _next_baud(self, board: Board) -> bool:
         """Tries another rate with a board that does not answer, if its line has none of its own."""
         link, address = board.output.link, board.output.address
-        if not isinstance(link, SerialLink) or not isinstance(address, LineAddress):
+        if link not in self._finding_baud or not isinstance(address, LineAddress):
             return False
-        if link not in self._finding_baud:
-            return False
-        baud = link.baud_of(address.device)
+        serial: Any = link
+        baud = serial.baud_of(address.device)
         at = BAUDS.index(baud) + 1 if baud in BAUDS else 0
         try:
-            link.set_baud(address.device, BAUDS[at % len(BAUDS)])
+            serial.set_baud(address.device, BAUDS[at % len(BAUDS)])
         except LinkError:
             return False
-        board.set_baud(self._adapters[link].port.identify(address).baud)
+        board.set_baud(self._adapters[serial].port.identify(address).baud)
         return True
 
     def _later(self, call: Callable[[], object]) -> None:
@@ -262,7 +264,7 @@ class _LinkAdapter:
         self._server = server
         self._link = link
         alone = name is not None
-        full = "/" + (name or NODE_NAME).strip("/")
+        full = "/" + (name or server.node_name).strip("/")
         self.port = server.core.attach(link, lambda address: identify(link, address, full, alone))
 
     def on_peer(self, address: Hashable) -> None:
