@@ -1,4 +1,4 @@
-"""What MicroPython has and CPython lacks, for ``compat``."""
+"""What MicroPython has and CPython lacks, for ``compat``; and what hosts have more, for ``exports``."""
 
 import time
 from importlib import import_module
@@ -9,11 +9,13 @@ if TYPE_CHECKING:  # typing would be the slowest part of `import muros`
     from typing import Any
 
 __all__ = [
+    "HOSTS",
     "borrow",
     "const",
     "copy",
     "lend",
     "loans",
+    "names",
     "release",
     "sleep_ms",
     "ticks_add",
@@ -76,3 +78,29 @@ def ticks_diff(later: int, earlier: int) -> int:
 def copy(target: bytearray, at: int, source: bytes | bytearray | memoryview, start: int, n: int) -> None:
     """Copies ``n`` bytes of ``source`` from ``start`` into ``target`` at ``at``."""
     target[at : at + n] = source[start : start + n]
+
+
+def names(places: str, package: str) -> list[str]:
+    """All public names of a package, by what ``exports`` says."""
+    found = {"Qos"}
+    for line in places.strip().split("\n"):
+        words = line.split()
+        if words and words[0].strip("*").split(".")[0] == package:
+            found.update(words[1:])
+    return sorted(found - {"Uart"})
+
+
+HOSTS = """
+client.hosts Session
+rclc.action_hosts ActionClient ActionServer
+rclc.host_entities Client Service
+rclc.host_executor Executor
+rclc.host_handles GuardCondition Subscription Timer
+rclc.hosts Context Node
+rclc.groups BEST_EFFORT CallbackGroup REAL_TIME_CRITICAL RealTimeClass SOFT_REAL_TIME ThreadError Threads
+rclc.host_clock Clock
+rclc.host_parameters Parameters
+rclc.parameter_files ParameterClient
+rclc.remapping ArgumentsError RosArguments remove_ros_arguments
+"""
+"""Where public names are that only hosts have, or hosts have of their own; see ``exports``."""

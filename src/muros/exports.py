@@ -1,11 +1,11 @@
 """Where the public names of ``muros.client`` and ``muros.rclc`` are, so that a board loads only what its program needs.
 
-Boards borrow this, and with it the modules with a star.
+Boards borrow this, and with it the modules with a star. What hosts have instead, or beside, is in ``_host``.
 """
 
 from muros.compat import MPY, borrow
 
-_PLACES = """
+PLACES = """
 client.custom Custom
 *client.discovery discover
 *client.link WAITING CONNECTING CONNECTED LOST
@@ -36,6 +36,8 @@ rclc.parameter_errors ParameterError ParameterNotDeclaredError ParameterTypeErro
 rclc.parameters Parameter Parameters
 rclc.ros_time RosTime
 rclc.service Service
+rclc.memory Rules
+rclc.arena Arena Text
 rclc.streaming Streamer
 rclc.subscription Subscription
 rclc.timer Timer
@@ -43,33 +45,15 @@ rclc.timer Timer
 *rclc.overruns CANCEL_CURRENT CANCEL_NEXT CANCEL_WITHOUT_OUTPUT GO_ON LOW_PRIORITY
 rclc.triggers all_of always any_of one
 """
-_ON_HOSTS = """
-client.hosts Session
-rclc.action_hosts ActionClient ActionServer
-rclc.host_entities Client Service
-rclc.host_executor Executor
-rclc.host_handles GuardCondition Subscription Timer
-rclc.hosts Context Node
-rclc.host_clock Clock
-rclc.host_parameters Parameters
-rclc.parameter_files ParameterClient
-rclc.remapping ArgumentsError RosArguments remove_ros_arguments
-"""
+if not MPY:
+    from muros.compat import HOSTS
 
-
-def names(package: str) -> "list[str]":
-    """All public names of a package that hosts have."""
-    found = {"Qos"}
-    for line in (_PLACES + _ON_HOSTS).strip().split("\n"):
-        words = line.split()
-        if words and words[0].strip("*").split(".")[0] == package:
-            found.update(words[1:])
-    return sorted(found - {"Uart"})
+    PLACES = HOSTS + PLACES
 
 
 def find(package: str, name: str) -> object:
     """What a package calls ``name``; AttributeError for what is not there."""
-    for line in (_PLACES if MPY else _ON_HOSTS + _PLACES).strip().split("\n"):
+    for line in PLACES.strip().split("\n"):
         words = line.split()
         if name not in words:
             continue

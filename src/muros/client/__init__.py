@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from muros.client.udp import Udp as Udp
 
 if not MPY:
-    __all__ = borrow("muros.exports").names("client")
+    from muros.compat import names
+
+    __all__ = names(borrow("muros.exports").PLACES, "client")
 
 
 def __getattr__(name: str) -> object:

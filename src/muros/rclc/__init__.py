@@ -17,10 +17,19 @@ if TYPE_CHECKING:
     from muros.client.qos import Qos as Qos
     from muros.rclc.action_hosts import ActionClient as ActionClient
     from muros.rclc.action_hosts import ActionServer as ActionServer
+    from muros.rclc.arena import Arena as Arena
+    from muros.rclc.arena import Text as Text
     from muros.rclc.errors import CapacityError as CapacityError
     from muros.rclc.errors import InvalidNameError as InvalidNameError
     from muros.rclc.errors import RclError as RclError
     from muros.rclc.goal_error import GoalError as GoalError
+    from muros.rclc.groups import BEST_EFFORT as BEST_EFFORT
+    from muros.rclc.groups import REAL_TIME_CRITICAL as REAL_TIME_CRITICAL
+    from muros.rclc.groups import SOFT_REAL_TIME as SOFT_REAL_TIME
+    from muros.rclc.groups import CallbackGroup as CallbackGroup
+    from muros.rclc.groups import RealTimeClass as RealTimeClass
+    from muros.rclc.groups import ThreadError as ThreadError
+    from muros.rclc.groups import Threads as Threads
     from muros.rclc.handle_error import HandleError as HandleError
     from muros.rclc.host_clock import Clock as Clock
     from muros.rclc.host_entities import Client as Client
@@ -36,6 +45,7 @@ if TYPE_CHECKING:
     from muros.rclc.lifecycle import Lifecycle as Lifecycle
     from muros.rclc.lifecycle_client import LifecycleClient as LifecycleClient
     from muros.rclc.logger import Logger as Logger
+    from muros.rclc.memory import Rules as Rules
     from muros.rclc.middleware import register as register
     from muros.rclc.overruns import CANCEL_CURRENT as CANCEL_CURRENT
     from muros.rclc.overruns import CANCEL_NEXT as CANCEL_NEXT
@@ -63,7 +73,9 @@ if TYPE_CHECKING:
     from muros.rclc.triggers import one as one
 
 if not MPY:
-    __all__ = borrow("muros.exports").names("rclc")
+    from muros.compat import names
+
+    __all__ = names(borrow("muros.exports").PLACES, "rclc")
 
 
 def __getattr__(name: str) -> object:

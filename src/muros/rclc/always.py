@@ -7,18 +7,6 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def begin(executor: "Any") -> None:
-    """Has an executor make such passes."""
-    executor.always = []
-    if getattr(executor, "on_error", None) is None:
-        executor.on_error = None
-    executor.work = lambda now: work(executor, now, False)
-    executor.beat = lambda now: work(executor, now, True)
-    executor.round = lambda timeout: (
-        type(executor).round(executor, timeout) or work(executor, executor.context.clock(), True)
-    )
-
-
 def work(executor: "Any", now: int, beat: bool) -> bool:
     """One pass; ``beat``: also when nothing is new, if there is a trigger and it says so."""
     executor.context.middleware.spin_once(now)

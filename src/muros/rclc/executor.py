@@ -26,7 +26,11 @@ class Executor:
 
     Without ``add`` it runs everything of the context that no other executor has claimed, in the order of making.
     ``handles`` bounds how many may be added (0: any number). ``trigger(handles)``, if given, decides before each pass
-    whether anything is taken. ``options`` are those of ``let``: ``semantics``, ``period`` and more.
+    whether anything is taken.
+
+    ``options``: ``period``, in seconds, is that of ``spin_period``. ``semantics`` is RCLCPP or LET; with LET
+    ``overrun`` is what follows when a callback is late, ``messages`` how many one publisher may publish in one run.
+    ``on_error(handle, error)`` is told what a callback raises: the executor goes on if it returns True.
     """
 
     stopped = False
@@ -43,9 +47,7 @@ class Executor:
         self.trigger = trigger
         self.handles: "list[Any]" = context.handles
         if options:
-            from muros.rclc.let import begin
-
-            begin(self, options)
+            self.begin(options)
 
     if TYPE_CHECKING:
         period: float  # ms
@@ -53,6 +55,7 @@ class Executor:
         let: "Any"
         due: "Any"  # when the period ends
 
+        begin = handles.begin
         add = handles.add
         remove = handles.remove
         spin_one_period = handles.spin_one_period

@@ -1,6 +1,6 @@
 """What programs ask of executors and of what they run now and then. Boards borrow this."""
 
-from muros.compat import const, ticks_add, ticks_diff
+from muros.compat import borrow, const, ticks_add, ticks_diff
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 _TIMEOUT = const(10)  # seconds
 _ON_NEW_DATA = const(0)
-_ALWAYS = const(1)
+
+
+def begin(self: "Executor", options: "dict[str, Any]") -> None:
+    """Sets up an executor that is given more than handles and a trigger."""
+    borrow("muros.rclc.periods").begin(self, options)
 
 
 def add(
@@ -32,19 +36,16 @@ def add(
     """
     if self.handles is self.context.handles:
         self.handles = []
-    if getattr(handle, "context", None) is not self.context:
-        raise _wrong("%r is no handle of this executor's context" % handle)
-    if handle in self.handles:
-        raise _wrong("%r was added already" % handle)
-    if when and not hasattr(handle, "take"):
-        raise _wrong("%r cannot run ALWAYS: only subscriptions can" % handle)
-    if self.capacity and len(self.handles) >= self.capacity:
-        from muros.rclc.errors import CapacityError
+    if (
+        getattr(handle, "context", None) is not self.context
+        or handle in self.handles
+        or 0 < self.capacity <= len(self.handles)
+    ):
+        from muros.rclc.handle_error import refuse
 
-        raise CapacityError(
-            "executor is full: %d handles of %d in use. Create it with handles=%d."
-            % (self.capacity, self.capacity, self.capacity + 1)
-        )
+        refuse(self, handle)
+    if when or hasattr(self, "let"):
+        borrow("muros.rclc.periods").prepare(self, handle, when, let, messages)
     if handle in self.context.handles:
         self.context.handles.remove(handle)
     if callback is not None:
@@ -52,22 +53,6 @@ def add(
     handle.eager = self.trigger is None
     handle.handles = self.handles
     self.handles.append(handle)
-    own = getattr(self, "let", None)
-    if own is not None:
-        task = own.task(handle)
-        task.let = int(let * 1000 + 0.5)
-        task.always = when == _ALWAYS
-        task.messages = messages or own.messages
-    elif when:
-        _always(self, handle)
-
-
-def _always(self: "Any", handle: "Any") -> None:
-    if not hasattr(self, "always"):
-        from muros.rclc.always import begin
-
-        begin(self)
-    self.always.append(handle)
 
 
 def remove(self: "Executor", handle: "Any") -> None:
@@ -75,14 +60,13 @@ def remove(self: "Executor", handle: "Any") -> None:
     if handle not in self.handles:
         from muros.rclc.handle_error import absent
 
-        raise absent(handle)
+        absent(handle)
     self.handles.remove(handle)
 
 
-def _wrong(text: str) -> Exception:
-    from muros.rclc.handle_error import HandleError
-
-    return HandleError(text)
+def stop(self: "Executor") -> None:
+    """Ends ``spin`` and ``spin_period`` when the callback that runs, or the period, is over."""
+    self.stopped = True
 
 
 def spin_period(self: "Executor", period: float = 0) -> None:
@@ -90,41 +74,12 @@ def spin_period(self: "Executor", period: float = 0) -> None:
 
     Late ones are caught up. The period may be that of the executor.
     """
-    self.due = None
-    while self.context.running and not self.stopped:
-        spin_one_period(self, period)
-    self.stopped = False
+    borrow("muros.rclc.periods").spin_period(self, period)
 
 
-def spin_one_period(self: "Any", period: float = 0) -> None:
+def spin_one_period(self: "Executor", period: float = 0) -> None:
     """Makes one pass and waits for the end of the period: the first begins now, each other where the last has ended."""
-    ms = int(period * 1000 + 0.5) if period else getattr(self, "period", 0)
-    if not ms:
-        raise ValueError("spin_period needs a period: spin_period(0.01), or Executor(context, period=0.01)")
-    let = getattr(self, "let", None)
-    start = getattr(self, "due", None)
-    if start is None:
-        start = self.context.clock()
-    self.due = ticks_add(start, ms)
-    middleware = self.context.middleware
-    if let is None:
-        getattr(self, "beat", self.work)(self.context.clock())
-    else:
-        middleware.spin_once(self.context.clock())
-        let.start(start)
-        let.execute()
-    left = ticks_diff(self.due, self.context.clock())
-    while left > 0 and self.context.running:
-        middleware.wait(left)
-        middleware.spin_once(self.context.clock())
-        left = ticks_diff(self.due, self.context.clock())
-    if let is not None:
-        let.finish()
-
-
-def stop(self: "Any") -> None:
-    """Ends ``spin`` and ``spin_period`` when the callback that runs, or the period, is over."""
-    self.stopped = True
+    borrow("muros.rclc.periods").spin_one_period(self, period)
 
 
 def destroy(self: "Handle") -> None:

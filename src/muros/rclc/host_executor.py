@@ -138,7 +138,14 @@ class Executor(executor_.Executor):
             raise HandleError(f"{describe(handle)}, was added already: an executor runs each handle once")
         if when == ALWAYS and not hasattr(handle, "take"):
             raise HandleError(f"{describe(handle)}, cannot run ALWAYS: only subscriptions can")
-        handles.add(self, handle, callback, when, let, messages)
+        handles.add(self, handle, callback)
+        if self.let is not None:
+            task = self.let.task(handle)
+            task.let = let * 1000  # type: ignore[assignment]  # boards count whole ones
+            task.always = when == ALWAYS
+            task.messages = messages or self.let.messages
+        elif when == ALWAYS:
+            self.always.append(handle)
 
     def remove(self, handle: Any) -> None:
         """Runs a handle no more; the others keep their order. Raises HandleError when it is not here."""

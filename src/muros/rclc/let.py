@@ -30,8 +30,6 @@ OVERRUN = 50
 _CANCEL_CURRENT = const(2)
 _CANCEL_WITHOUT_OUTPUT = const(3)
 _CANCEL_NEXT = const(4)
-_LOW_PRIORITY = const(5)
-_MESSAGES = const(10)
 _CONNECTED = const(2)
 _OFFLINE = const(0)
 _FULL = const(1)
@@ -301,34 +299,3 @@ class Outputs:
         backlog.items.append(data)
         backlog.pump()
         return True
-
-
-def begin(executor: "Executor", options: "dict[str, Any]") -> None:
-    """Sets up an executor of a board that is given more than handles and a trigger.
-
-    ``period``, in seconds, is that of ``spin_period``. ``semantics`` is RCLCPP or LET; with LET ``overrun`` is one of
-    ``overruns``, and ``messages`` how many one publisher may publish in one run of a callback.
-    ``on_error(handle, error)`` is told what a callback raises: the executor goes on if it returns True. ValueError for
-    anything else.
-    """
-    made: "Any" = executor
-    made.period = int(options.pop("period", 0) * 1000 + 0.5)
-    semantics = options.pop("semantics", 0)
-    overrun = options.pop("overrun", 1)
-    messages = options.pop("messages", _MESSAGES)
-    made.on_error = options.pop("on_error", None)
-    if options or overrun == _LOW_PRIORITY:
-        raise ValueError("no board has executors with %s" % (", ".join(options) or "LOW_PRIORITY"))
-    if semantics:
-        middleware = executor.context.middleware
-        let = made.let = Let(executor, made.period, overrun, messages, Outputs(middleware))
-
-        def work(now: int) -> bool:
-            middleware.spin_once(now)
-            return let.work(now)
-
-        made.work = work
-    elif made.on_error is not None:
-        from muros.rclc.always import begin as always
-
-        always(executor)

@@ -1,0 +1,106 @@
+"""Executors of boards that keep periods or ask for more than handles and a trigger. Boards borrow this.
+
+What such an executor does in each pass is in ``let`` and ``always``, which stay.
+"""
+
+from muros.compat import const, ticks_add, ticks_diff
+
+TYPE_CHECKING = const(0)
+if TYPE_CHECKING:
+    from typing import Any
+
+_ALWAYS = const(1)
+_LOW_PRIORITY = const(5)
+_MESSAGES = const(10)
+
+
+def begin(executor: "Any", options: "dict[str, Any]") -> None:
+    """Sets up an executor; ``options`` as for ``Executor``. Raises ValueError for what boards have not."""
+    executor.period = int(options.pop("period", 0) * 1000 + 0.5)
+    semantics = options.pop("semantics", 0)
+    overrun = options.pop("overrun", 1)
+    messages = options.pop("messages", _MESSAGES)
+    executor.on_error = options.pop("on_error", None)
+    if options or overrun == _LOW_PRIORITY:
+        raise ValueError("no board has executors with %s" % (", ".join(options) or "LOW_PRIORITY"))
+    if semantics:
+        from muros.rclc.let import Let, Outputs
+
+        middleware = executor.context.middleware
+        let = executor.let = Let(executor, executor.period, overrun, messages, Outputs(middleware))
+
+        def work(now: int) -> bool:
+            middleware.spin_once(now)
+            return let.work(now)
+
+        executor.work = work
+    elif executor.on_error is not None:
+        _watch(executor)
+
+
+def prepare(executor: "Any", handle: "Any", when: int, let: float, messages: int) -> None:
+    """Sets up a handle that is about to be added."""
+    if when and not hasattr(handle, "take"):
+        from muros.rclc.handle_error import HandleError
+
+        raise HandleError("%r cannot run ALWAYS: only subscriptions can" % handle)
+    own = getattr(executor, "let", None)
+    if own is not None:
+        task = own.task(handle)
+        task.let = int(let * 1000 + 0.5)
+        task.always = when == _ALWAYS
+        task.messages = messages or own.messages
+    elif when:
+        if not hasattr(executor, "always"):
+            _watch(executor)
+        executor.always.append(handle)
+
+
+def _watch(executor: "Any") -> None:
+    """Has an executor make passes that call subscriptions without data, and decide about errors."""
+    from muros.rclc.always import work
+
+    executor.always = []
+    if not hasattr(executor, "on_error"):
+        executor.on_error = None
+    executor.work = lambda now: work(executor, now, False)
+    executor.beat = lambda now: work(executor, now, True)
+    executor.round = lambda timeout: (
+        type(executor).round(executor, timeout) or work(executor, executor.context.clock(), True)
+    )
+
+
+def spin_period(executor: "Any", period: float) -> None:
+    """Makes one pass each ``period`` seconds, until the executor is stopped or its context closed."""
+    executor.due = None
+    while executor.context.running and not executor.stopped:
+        spin_one_period(executor, period)
+    executor.stopped = False
+
+
+def spin_one_period(executor: "Any", period: float) -> None:
+    """Makes one pass and waits for the end of the period."""
+    ms = int(period * 1000 + 0.5) if period else getattr(executor, "period", 0)
+    if not ms:
+        raise ValueError("spin_period needs a period: spin_period(0.01), or Executor(context, period=0.01)")
+    clock = executor.context.clock
+    middleware = executor.context.middleware
+    let = getattr(executor, "let", None)
+    start = getattr(executor, "due", None)
+    if start is None:
+        start = clock()
+    executor.due = ticks_add(start, ms)
+    if let is None:
+        getattr(executor, "beat", executor.work)(clock())
+    else:
+        let.period = ms
+        middleware.spin_once(clock())
+        let.start(start)
+        let.execute()
+    left = ticks_diff(executor.due, clock())
+    while left > 0 and executor.context.running and (let is not None or not executor.stopped):
+        middleware.wait(min(left, middleware.deadline(clock())))
+        middleware.spin_once(clock())
+        left = ticks_diff(executor.due, clock())
+    if let is not None:
+        let.finish()
