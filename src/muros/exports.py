@@ -53,8 +53,11 @@ if not MPY:
 
 def find(package: str, name: str) -> object:
     """What a package calls ``name``; AttributeError for what is not there."""
-    for line in PLACES.strip().split("\n"):
-        words = line.split()
+    at = 1
+    while at < len(PLACES):  # splitting all of it at once would take a board's heap
+        end = PLACES.find("\n", at)
+        words = PLACES[at:end].split()
+        at = end + 1
         if name not in words:
             continue
         place = words[0].strip("*")
