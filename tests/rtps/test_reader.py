@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from muros.rtps._endpoint import Place, Problem, first_count
+from muros.rtps._endpoint import MILLISECOND, Place, Problem, first_count
 from muros.rtps._events import AckNack, Data, DataFrag, Event, Gap, Heartbeat, HeartbeatFrag, NackFrag
 from muros.rtps._reader import ReaderCore
 from muros.rtps._settings import ReaderSettings
@@ -574,6 +574,59 @@ class TestRefusing:
         assert bench.got == [1, 5, 6]
         assert bench.problems == ([] if how == "gap" else [(Problem.SAMPLES_LOST, 3)])
         assert bench.at_rest()
+
+
+class TestPatience:
+    """Writers that speak first, and bear to be answered together with others."""
+
+    def bench(self, **options: Any) -> Bench:
+        bench = Bench(matched=False, together=10 * MILLISECOND)
+        bench.now += 3 * MILLISECOND
+        bench.match(patient=True, **options)
+        return bench
+
+    def test_a_patient_writer_is_asked_only_when_it_stays_silent(self) -> None:
+        bench = self.bench()
+        bench.wait(700 * MILLISECOND)
+        assert bench.sent == []
+        bench.wait(200 * MILLISECOND)
+        (hello,) = bench.take(AckNack)
+        assert (hello.missing, hello.final) == ((), False)
+        bench = self.bench()
+        bench.beat(1, 0)
+        bench.wait(10 * SECOND)
+        assert bench.sent == []
+
+    def test_answers_leave_at_common_times(self) -> None:
+        bench = self.bench()
+        bench.beat(1, 2, final=False)
+        bench.match(b"x" * 12, patient=True)
+        bench.wait(3 * MILLISECOND)
+        bench.beat(1, 2, final=False, writer=b"x" * 12)
+        bench.data(1, 2)
+        assert bench.sent == []
+        bench.wait(4 * MILLISECOND)
+        assert [(ack.base, ack.missing) for ack in bench.take(AckNack)] == [(3, ()), (1, (1, 2))]
+
+    def test_what_is_known_already_is_acknowledged_and_not_asked_for(self) -> None:
+        bench = self.bench(known=7)
+        (ack,) = bench.take(AckNack)
+        assert (ack.base, ack.missing, ack.final) == (8, (), True)
+        bench.wait(10 * SECOND)
+        bench.data(7, 8)
+        assert (bench.got, bench.sent) == ([8], [])
+
+    def test_what_was_delivered_may_be_relied_on(self) -> None:
+        bench = self.bench()
+        writer = guid_of(THEM, WRITER)
+        assert bench.core.known_from(writer) == 0
+        bench.data(1, 2)
+        assert bench.core.known_from(writer) == 0, "there may have been others before"
+        bench.beat(1, 2)
+        assert (bench.core.known_from(writer), bench.core.next_of(writer)) == (2, 3)
+        bench.data(4)
+        assert bench.core.known_from(writer) == 0
+        assert bench.core.known_from(guid_of(b"x" * 12, WRITER)) == 0
 
 
 class TestLimits:

@@ -457,7 +457,7 @@ def test_numbers_are_64_bit_and_counts_wrap(seed: int) -> None:
     a, b = Node(network, "a"), Node(network, "b")
     start = 2**32 - 20
     writer = a.writer(depth=None, last=start, settings=SMALL_WRITER)
-    writer._count = 2**32 - 12
+    writer._beats._count = 2**32 - 12
     reader = b.reader()
     match(a, b)
     proxy = reader.writers[0]
@@ -467,7 +467,7 @@ def test_numbers_are_64_bit_and_counts_wrap(seed: int) -> None:
         run(network, 15 * MS, a, b)
     run(network, 60 * SECOND, a, b)
     assert b.numbers() == list(range(start + 1, start + 61))
-    assert writer._count > 2**32
+    assert writer._beats._count > 2**32
     assert proxy.sent_count < 1000
     assert at_rest(a, b)
 

@@ -1,9 +1,9 @@
 """Says that a participant of ours is there (DDSI-RTPS 2.3, 8.5.3: the simple participant discovery protocol).
 
 One participant of a process does so often in its first second, then with a steady period, to all addresses known in
-advance; the others once, to groups. All do it to the participants that are known, where they listen, often enough for the lease;
-and at once to each that is met. Announcements have no
-acknowledgement: what is lost is said again. To one just met it is said again soon, unless it talks to us meanwhile:
+advance; the others once, to groups. All do it to the participants that are known, where they listen, often enough for
+the lease; and at once to each that is met, unless another one at the same place has just been told. Announcements have
+no acknowledgement: what is lost is said again. To one just met it is said again soon, unless it talks to us meanwhile:
 it may have begun to listen only after our answer.
 """
 

@@ -257,8 +257,7 @@ class Discovery(Timed):
                 or (inline_qos is not None and status_info(inline_qos) & _GONE)
             ):
                 guid = key_untrusted(sample.payload, sample.inline_qos)
-                if guid in known.endpoints:
-                    self._forget(known, guid, Why.LEFT, now)
+                self._domain.left(guid, sample, now)
                 return True
             endpoint = self._domain.endpoint_data(sample.payload)
         except (InvalidDiscoveryData, InvalidParameters) as error:
@@ -270,6 +269,22 @@ class Discovery(Timed):
             return True
         self._learn(known, endpoint, len(sample.payload), now)
         return True
+
+    def left(self, guid: Guid, sample: Data, now: int) -> None:
+        """An endpoint has gone, as this participant or another of this process has heard.
+
+        One that has inherited what others had heard might not be told itself any more. What it has heard of the
+        endpoint after that sample holds.
+        """
+        known = self.known.get(sample.source)
+        listener = self._readers.get(sample.writer)
+        if (
+            known is not None
+            and listener is not None
+            and guid in known.endpoints
+            and listener.core.next_of(guid_of(sample.source, sample.writer)) <= sample.sequence
+        ):
+            self._forget(known, guid, Why.LEFT, now)
 
     def _learn(self, known: Known, endpoint: EndpointData, size: int, now: int) -> None:
         guid = endpoint.guid

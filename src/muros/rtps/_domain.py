@@ -305,6 +305,12 @@ class DomainCore:
         others = (other for other in self._participants.values() if other is not participant)
         return next((found for other in others if (found := other.discovery_of(prefix)) is not None), None)
 
+    def left(self, guid: Guid, sample: Data, now: int) -> None:
+        """One of our participants has heard that an endpoint has gone: so it has for all."""
+        for participant in tuple(self._participants.values()):
+            if (discovery := participant.discovery_of(sample.source)) is not None:
+                discovery.left(guid, sample, now)
+
     def number(self) -> int:
         """The number of a new announcement.
 

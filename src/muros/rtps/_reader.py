@@ -37,8 +37,8 @@ SAMPLE_COST: Final = 500
 NACK_FRAGS_MOST: Final = 8
 """Incomplete samples whose fragments are asked for at once."""
 
-PATIENT_HELLO: Final = 8
-"""Hello periods that a patient writer is given to speak first."""
+PATIENT_HELLOS: Final = 3
+"""A patient writer is given the time to speak first in which others would be asked so often."""
 
 ASSEMBLIES_MOST: Final = 8
 """Samples of one best-effort writer put together at the same time."""
@@ -144,7 +144,8 @@ class ReaderCore:
             proxy.last = known
             self._send_to(proxy, [self._acknack(proxy, [], final=True)])
         elif proxy.reliable and proxy.patient:
-            proxy.hello_at = now + PATIENT_HELLO * self.settings.hello_period
+            proxy.hellos = min(PATIENT_HELLOS, self.settings.hellos)
+            proxy.hello_at = now + (self.settings.hello_period << proxy.hellos)
             self._wake(proxy, proxy.hello_at)
         elif proxy.reliable:
             self._hello(proxy, now)
@@ -155,6 +156,10 @@ class ReaderCore:
         if proxy is None or not proxy.reliable or proxy.paused or proxy.pending or proxy.count is None:
             return 0
         return proxy.expected - 1
+
+    def next_of(self, writer: Guid) -> int:
+        """The sample that is delivered next of a matched writer."""
+        return self._proxies[split_guid(writer)].expected
 
     def unmatch_writer(self, writer: Guid) -> None:
         """The writer has gone or no longer fits; what had come too early is dropped."""

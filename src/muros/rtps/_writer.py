@@ -21,8 +21,9 @@ is when it returns.
 from collections.abc import Callable, Iterable
 from typing import Final
 
+from muros.rtps._beats import Beats
 from muros.rtps._constants import ENTITYID_UNKNOWN
-from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, first_count, newer, next_slot
+from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, newer, next_slot
 from muros.rtps._fragments import fragments_of
 from muros.rtps._history import Sample
 from muros.rtps._keeping import Keeper
@@ -31,7 +32,7 @@ from muros.rtps._repairs import Repairs
 from muros.rtps._sending import OVERHEAD, WINDOW_LEAST, Allowance, Window, data_of, fragment_of, skips_of
 from muros.rtps._settings import WRITER_DEFAULTS, WriterSettings
 from muros.rtps._values import EntityId, Guid, GuidPrefix, split_guid
-from muros.rtps._wire import MAX_SUBMESSAGE, AckNack, NackFrag, heartbeat, info_dst, info_ts
+from muros.rtps._wire import MAX_SUBMESSAGE, AckNack, NackFrag, info_dst, info_ts
 
 __all__ = ["WriterCore"]
 
@@ -71,7 +72,7 @@ class WriterCore:
     """
 
     __slots__ = (
-        "_allowance", "_ask_at", "_ask_every", "_count", "_cursor", "_endpoint_qos", "_entity",
+        "_allowance", "_ask_at", "_ask_every", "_beats", "_cursor", "_endpoint_qos", "_entity",
         "_history", "_idle", "_keeper", "_lagging", "_leaving", "_proxies",
         "_reliable", "_repair_at", "_repairs", "_report", "_routes", "_send", "_unasked", "_unsent",
         "_window", "_with_qos", "due", "guid", "last", "reliable", "sent", "settings",
@@ -133,7 +134,7 @@ class WriterCore:
             settings.hold_off,
             together=settings.together > 0,
         )
-        self._count = 0
+        self._beats = Beats(self._entity, send, self._keeper, self._proxies)
         self._ask_at = 0
         kept = settings.limit if depth is None else max(depth, ASK_LEAST * 4)
         self._ask_every = max(1, min(ASK_MOST, kept // 4))
@@ -188,15 +189,14 @@ class WriterCore:
         Everything for it goes to each of `places`. For a reader that is matched already only they are changed; it is
         then told anew what there is.
         """
-        if not self._count:
-            self._count = first_count(now)
+        self._beats.begin(now)
         key = split_guid(reader)
         proxy = self._proxies.get(key)
         if proxy is not None:
             before, proxy.places = proxy.places, tuple(places)
             self._reroute()
             if proxy.reliable and proxy.places != before:
-                self._send_heartbeat(proxy, final=False)
+                self._beats.send(proxy, self.sent, final=False)
             return
         start = self.sent + 1
         if self._keeper.retains and reliable and transient_local:
@@ -216,7 +216,7 @@ class WriterCore:
                 self._repairs.offer(proxy, self._lowest(), self.sent, now)
                 self._repair_soon(proxy, now)
             else:
-                self._send_heartbeat(proxy, final=not lags)
+                self._beats.send(proxy, self.sent, final=not lags)
 
     def unmatch(self, reader: Guid, now: int) -> None:
         """The reader has gone or no longer fits; nothing happens when it is not matched."""
@@ -316,7 +316,7 @@ class WriterCore:
         elif not event.final:
             # One that is not final asks for an answer. The answer must not ask back when nothing has changed:
             # two such sides would not come to rest.
-            self._send_heartbeat(proxy, final=proxy in self._idle or not (progress or is_first))
+            self._beats.send(proxy, self.sent, final=proxy in self._idle or not (progress or is_first))
         if progress:
             if self._lagging:
                 self._window.acknowledged(self.acknowledged, now)
@@ -331,7 +331,7 @@ class WriterCore:
         """An old count counts where a reader has forgotten us, has met us again, and asks what there is."""
         if event.base <= 1 and not event.missing and not event.final and event.count != proxy.count:
             proxy.count, proxy.fragment_count = event.count, None
-            self._send_heartbeat(proxy, final=proxy in self._idle)
+            self._beats.send(proxy, self.sent, final=proxy in self._idle)
 
     def on_nack_frag(self, event: NackFrag, now: int) -> None:
         """A reader misses fragments of a sample (8.3.7.10)."""
@@ -346,11 +346,7 @@ class WriterCore:
 
     def assert_liveliness(self, now: int) -> None:
         """Say that a writer with manual liveliness is alive (8.3.7.5: HEARTBEAT with the liveliness flag)."""
-        first = self._lowest()
-        self._count += 1
-        beat = heartbeat(
-            ENTITYID_UNKNOWN, self._entity, first, self.sent, self._count, final=True, liveliness=True
-        )
+        beat = self._beats.for_all(self.sent, final=True, alive=True)
         for place in self._routes:
             self._send([beat], None, place)
 
@@ -462,7 +458,7 @@ class WriterCore:
         if not repairs.waiting:
             self._repair_at = NEVER
             return
-        self._ask_together(repairs.run(now, self._asking_heartbeat))
+        self._beats.ask_together(repairs.run(now, self._asking_heartbeat), self.sent)
         self._repair_at = now + self.settings.pace if repairs.waiting else NEVER
         self.due = min(self.due, self._repair_at)
 
@@ -518,61 +514,18 @@ class WriterCore:
         self._unasked = 0
         self._window.asked(self.sent, now)
         self._ask_at = now + self.settings.heartbeat_period // 2
-        self._count += 1
-        return heartbeat(ENTITYID_UNKNOWN, self._entity, self._lowest(), self.sent, self._count)
-
-    def _heartbeat(self, proxy: ReaderProxy, *, final: bool) -> bytes:
-        """A heartbeat for one reader: it counts what is meant for that one only."""
-        self._count += 1
-        first = max(self._lowest(), proxy.start)
-        return heartbeat(proxy.entity, self._entity, first, self.sent, self._count, final=final)
+        return self._beats.for_all(self.sent)
 
     def _asking_heartbeat(self, proxy: ReaderProxy) -> bytes:
-        return self._heartbeat(proxy, final=False)
-
-    def _send_heartbeat(self, proxy: ReaderProxy, *, final: bool) -> None:
-        beat = self._heartbeat(proxy, final=final)
-        for place in proxy.places:
-            self._send([beat], proxy.prefix, place)
+        return self._beats.for_one(proxy, self.sent)
 
     def _beat(self, due: list[ReaderProxy], now: int) -> None:
-        """Ask lagging readers for acknowledgement, those of one participant together."""
-        groups: dict[tuple[GuidPrefix, tuple[Place, ...]], list[ReaderProxy]] = {}
-        self._ask_together([proxy for proxy in due if proxy.patient])
+        """Ask lagging readers for acknowledgement."""
         for proxy in due:
-            if not proxy.patient:
-                groups.setdefault((proxy.prefix, proxy.places), []).append(proxy)
             proxy.interval = min(proxy.interval * 2, self.settings.heartbeat_slowest)
             proxy.due = now + proxy.interval
-        for (prefix, places), proxies in groups.items():
-            if len(proxies) == 1:
-                self._send_heartbeat(proxies[0], final=False)
-                continue
-            self._count += 1
-            first = max(self._lowest(), min(proxy.start for proxy in proxies))
-            beat = heartbeat(ENTITYID_UNKNOWN, self._entity, first, self.sent, self._count)
-            for place in places:
-                self._send([beat], prefix, place)
-
-    def _ask_together(self, proxies: list[ReaderProxy]) -> None:
-        """Tell patient readers what there is, and ask those that lag: all at one place at once, if most are meant."""
-        by_place: dict[tuple[Place, ...], list[ReaderProxy]] = {}
-        for proxy in proxies:
-            by_place.setdefault(proxy.places, []).append(proxy)
-        for places, meant in by_place.items():
-            # One that was never heard of is asked to answer even when there is nothing it could miss.
-            final = all(proxy in self._idle and proxy.count is not None for proxy in meant)
-            there = sum(proxy.places == places for proxy in self._proxies.values())
-            if len(meant) > 1 and 2 * len(meant) > there:
-                self._count += 1
-                beat = heartbeat(
-                    ENTITYID_UNKNOWN, self._entity, self._lowest(), self.sent, self._count, final=final
-                )
-                for place in places:
-                    self._send([beat], None, place)
-            else:
-                for proxy in meant:
-                    self._send_heartbeat(proxy, final=proxy in self._idle and proxy.count is not None)
+        self._beats.ask([proxy for proxy in due if not proxy.patient], self.sent)
+        self._beats.ask_together([proxy for proxy in due if proxy.patient], self.sent)
 
     # --- Readers -----------------------------------------------------------------------------------------
 
