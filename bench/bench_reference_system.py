@@ -27,8 +27,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from bench import _plots as plots  # noqa: E402
-from bench.reference_system import HOT_PATH, System, count_primes, node_names  # noqa: E402
-from muros.rclc import Context, Executor  # noqa: E402
+from bench.reference_system import HOT_PATH, PLANNER, System, count_primes, node_names  # noqa: E402
+from muros.rclc import LET, Context, Executor  # noqa: E402
 
 PERIOD = 0.005
 """Seconds of a period of the executor in logical execution time."""
@@ -124,14 +124,19 @@ def single(context: Context, system: System) -> Callable[[float], object]:
 
 def prioritised(context: Context, system: System) -> Callable[[float], object]:
     """The hot path first, the planner next."""
-    names = [*HOT_PATH, "BehaviorPlanner"]
-    names += [name for name in node_names() if name not in names]
-    return _until(on_one(context, system, names), context)
+    return _until(on_one(context, system, _important_first()), context)
+
+
+def let(context: Context, system: System) -> Callable[[float], object]:
+    """The hot path first, in periods: what a callback publishes leaves at the end of the period."""
+    executor = on_one(context, system, _important_first(), semantics=LET, period=PERIOD)
+    return _until(executor, context)
 
 
 EXECUTORS: dict[str, Callable[[Context, System], Callable[[float], object]]] = {
     "single": single,
     "prioritised": prioritised,
+    "let": let,
 }
 
 
@@ -160,10 +165,16 @@ def draw(rows: dict[str, Figures], folder: Path) -> None:
         (folder / f"{key}-distribution.svg").write_text(plots.distribution(title, unit, values))
 
 
+def _important_first() -> list[str]:
+    names = [*HOT_PATH, PLANNER]
+    return names + [name for name in node_names() if name not in names]
+
+
 def _until(executor: Executor, context: Context) -> Callable[[float], object]:
     def spin(end: float) -> None:
-        while (left := end - time.monotonic()) > 0:
-            executor.spin_some(left)
+        timer = context.node("clock").timer(end - time.monotonic(), executor.stop)
+        executor.add(timer)
+        executor.spin()
 
     return spin
 

@@ -26,6 +26,13 @@ TYPES = (
     "std_msgs/msg/UInt8MultiArray",
     "sensor_msgs/msg/JointState",
     "example_interfaces/srv/AddTwoInts",
+    "rcl_interfaces/srv/GetParameters",
+    "rcl_interfaces/srv/GetParameterTypes",
+    "rcl_interfaces/srv/SetParameters",
+    "rcl_interfaces/srv/SetParametersAtomically",
+    "rcl_interfaces/srv/ListParameters",
+    "rcl_interfaces/srv/DescribeParameters",
+    "rcl_interfaces/msg/ParameterEvent",
 )
 """What the examples import on boards."""
 
