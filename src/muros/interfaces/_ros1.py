@@ -136,7 +136,35 @@ def ros1_definition(ros1_type: str, distro: str | None = None) -> tuple[Message,
     return found, _hashes.ros1_message_md5(home, found)
 
 
+def ros1_text(ros1_type: str, distro: str | None = None) -> str:
+    """The text of a message's ROS 1 definition and of all nested ones, as TCPROS headers and bag files have it."""
+    home = _api.registry(distro)
+    parts: dict[str, str] = {}
+    todo = [ros1_type]
+    while todo:
+        name = todo.pop(0)
+        if name in parts:
+            continue
+        found = _definition(home, name)
+        lines = [f"{constant.base} {constant.name}={constant.text}" for constant in found.constants]
+        for field in found.fields:
+            base = field.type.base
+            if base in _TIMES:
+                base = _TIMES[base]
+            elif field.type.nested:
+                base = ros1_name(base)
+                todo.append(base)
+            lines.append(f"{base}{field.type.suffix()} {field.name}")
+        parts[name] = "".join(line + "\n" for line in lines)
+    first, *others = parts.items()
+    return first[1] + "".join(f"{_RULE}\nMSG: {name}\n{text}" for name, text in others)
+
+
 # ---- making one ----
+
+_TIMES = {"builtin_interfaces/msg/Time": "time", "builtin_interfaces/msg/Duration": "duration"}
+_RULE = "=" * 80
+
 
 
 def _convert(home: Registry, ros1_type: str, md5: str | None) -> Converter:
