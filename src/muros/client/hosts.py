@@ -145,6 +145,15 @@ class Session(board.Session):
         """Waits until something may have come or ``wake`` is called, at most ``timeout`` ms; any number of threads."""
         self._gate.wait(self.transport if self.up else None, timeout)
 
+    @property
+    def seen(self) -> int:
+        """Where this thread is in what has come, for ``adopt``."""
+        return self._gate.seen
+
+    def adopt(self, seen: int) -> None:
+        """Has this thread wait in the place of the one that asked ``seen``, and looks at the session itself."""
+        self._gate.adopt(seen)
+
     def wake(self) -> None:
         """Ends a wait, from any thread."""
         self._gate.wake()

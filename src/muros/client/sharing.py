@@ -61,6 +61,15 @@ class Turnstile:
                 self.several = self.several or self._threads > 1
         self._seen.generation = self._generation
 
+    @property
+    def seen(self) -> int:
+        """The generation that this thread has seen, for another one that is to wait in its place."""
+        return self._seen.generation
+
+    def adopt(self, generation: int) -> None:
+        """This thread waits in the place of one that has seen a generation."""
+        self._seen.generation = generation
+
     def wake(self) -> None:
         """Ends every wait, and the next one of each thread that has not looked since; from any thread."""
         with self._changed:

@@ -1,52 +1,121 @@
-"""How executors wait in asyncio programs: the loop of the program goes on meanwhile."""
+"""How executors wait in asyncio programs: the loop of the program goes on meanwhile.
+
+Theory of operation. Middlewares are waited for by threads, and any thread may wake them. So each executor that is spun
+in an asyncio program has a thread that does nothing but wait for it; callbacks and passes run in the loop's thread. A
+space that the program's own loop serves needs no thread: it rings a bell when something has come.
+
+Several executors of one context may be spun by tasks of one loop. What one of them has the middleware hand on may be
+for another, which waits: so each, before it waits, rouses those that have something to do now.
+"""
 
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+import queue
+import threading
+import weakref
+from contextlib import suppress
+from typing import TYPE_CHECKING, Any
 
-_LOOK = 5.0
-"""Milliseconds after which a transport is looked at again that says nothing of what has come."""
+if TYPE_CHECKING:
+    from muros.rclc.host_executor import Executor
+
+Came = asyncio.Future[bool]
+"""Done when a wait is over; whether the thread that waited has said so."""
+
+_waiting: weakref.WeakKeyDictionary[Any, list[tuple[Executor, Came]]] = weakref.WeakKeyDictionary()
+"""Who waits, by context."""
 
 
-async def wait_async(middleware: Any, timeout: float) -> None:
-    """Waits until something may have come, at most `timeout` ms, and lets others run in any case.
+class Sleeper:
+    """The thread that waits for an executor, from when it is first needed until the executor is gone."""
 
-    A middleware that has `wait_async(timeout)` does it by itself. Of a session whose transport is a file or a socket
-    the loop tells when something has come; of any other transport it is asked now and then.
-    """
+    def __init__(self, executor: Executor) -> None:
+        self._orders: queue.SimpleQueue[tuple[asyncio.AbstractEventLoop, Any, float, Any, Came] | None]
+        self._orders = queue.SimpleQueue()
+        threading.Thread(target=_sleep, args=(self._orders,), daemon=True, name="muros asyncio").start()
+        weakref.finalize(executor, self._orders.put, None)
+
+    def wait(self, loop: asyncio.AbstractEventLoop, middleware: Any, timeout: float, came: Came) -> None:
+        """Has `came` done when something may have come, after `timeout` ms at the latest."""
+        self._orders.put((loop, middleware, timeout, getattr(middleware, "seen", None), came))
+
+
+async def pause(executor: Executor, timeout: float) -> None:
+    """Waits until something may have come for an executor, at most `timeout` ms; lets others run in any case."""
+    context = executor.context
+    _rouse(executor)
     if timeout <= 0:
         await asyncio.sleep(0)
         return
-    own = getattr(middleware, "wait_async", None)
-    if own is not None:
-        await own(timeout)
-        return
-    file = getattr(getattr(middleware, "transport", None), "_file", None)
-    if file is None or not getattr(middleware, "up", False):
-        await asyncio.sleep(min(timeout, _LOOK) / 1000)
-        return
-    await readable(file, timeout)
-
-
-async def readable(file: Any, timeout: float) -> None:
-    """Waits until there is something to read from a file, at most `timeout` ms."""
     loop = asyncio.get_running_loop()
-    came: asyncio.Future[None] = loop.create_future()
-    number = file if isinstance(file, int) else file.fileno()
-    try:
-        loop.add_reader(number, _settle, came)
-    except (NotImplementedError, PermissionError, ValueError):  # a loop, or a file, that cannot
-        await asyncio.sleep(min(timeout, _LOOK) / 1000)
+    came: Came = loop.create_future()
+    middleware: Any = context.middleware
+    if hasattr(middleware, "wait_async"):
+        await middleware.wait_async(timeout)
         return
-    timer = loop.call_later(timeout / 1000, _settle, came)
+    waiting = _waiting.setdefault(context, [])
+    waiting.append((executor, came))
     try:
-        await came
+        if getattr(middleware, "served", True):
+            if executor.sleeper is None:
+                executor.sleeper = Sleeper(executor)
+            executor.sleeper.wait(loop, middleware, timeout, came)
+            try:
+                await came
+            finally:
+                if came.cancelled() or not came.result():
+                    executor.wake()  # the thread waits still
+        else:
+            await _ring(loop, middleware, timeout, came)
+    finally:
+        waiting.remove((executor, came))
+
+
+async def wait_async(middleware: Any, timeout: float) -> None:
+    """Lets `timeout` ms pass, for a middleware that has `wait_async` of its own and can only be looked at again."""
+    await asyncio.sleep(timeout / 1000)
+
+
+async def _ring(loop: asyncio.AbstractEventLoop, middleware: Any, timeout: float, came: Came) -> None:
+    """Waits for the bell of a middleware that the running loop serves."""
+
+    def bell() -> None:
+        loop.call_soon_threadsafe(_settle, came, True)
+
+    timer = loop.call_later(timeout / 1000, _settle, came, True)
+    middleware.bells.append(bell)
+    try:
+        if not middleware.came:
+            await came
     finally:
         timer.cancel()
-        loop.remove_reader(number)
+        middleware.bells.remove(bell)
 
 
-def _settle(came: asyncio.Future[None]) -> None:
+def _rouse(executor: Executor) -> None:
+    """Wakes the other executors of a context that have something to do now."""
+    for other, came in _waiting.get(executor.context, ()):
+        if other is not executor and not came.done():
+            now = other.context.clock()
+            if any(handle.ready(now) for handle in other.handles):
+                came.set_result(False)
+
+
+def _sleep(orders: queue.SimpleQueue[Any]) -> None:
+    """What the thread does."""
+    while (order := orders.get()) is not None:
+        loop, middleware, timeout, seen, came = order
+        try:
+            if seen is not None:
+                middleware.adopt(seen)
+            middleware.wait(timeout if seen is None else max(1, int(timeout)))
+        finally:
+            with suppress(RuntimeError):  # the loop is closed
+                loop.call_soon_threadsafe(_settle, came, True)
+        del order, loop, middleware, came
+
+
+def _settle(came: Came, by_thread: bool) -> None:
     if not came.done():
-        came.set_result(None)
+        came.set_result(by_thread)

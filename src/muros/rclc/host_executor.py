@@ -22,7 +22,7 @@ from muros.rclc import context as context_
 from muros.rclc import executor as executor_
 from muros.rclc import handles
 from muros.rclc.handle_error import HandleError
-from muros.rclc.host_async import wait_async
+from muros.rclc.host_async import Sleeper, pause
 from muros.rclc.host_checks import WrongTypeError, WrongValueError, be_callable
 from muros.rclc.host_handles import describe, tell_problem, ticks
 from muros.rclc.host_let import HostLet, HostTask
@@ -94,6 +94,8 @@ class Executor(executor_.Executor):
         self.let: HostLet | None = HostLet(self, self.period, overrun, messages) if semantics == LET else None
         self.always: list[Any] = []
         """The subscriptions that are called in each pass."""
+        self.sleeper: Sleeper | None = None
+        """What waits in an asyncio program."""
         self.due: float | None = None
 
     # What is run
@@ -382,7 +384,7 @@ class Executor(executor_.Executor):
         """Has the running asyncio loop go on between the steps."""
         try:
             while True:
-                await wait_async(self.context.middleware, next(steps))
+                await pause(self, next(steps))
         except StopIteration as done:
             result: Result = done.value
             return result

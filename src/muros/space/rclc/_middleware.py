@@ -67,6 +67,8 @@ class SpaceMiddleware:
         """What has something to hand on."""
         self.findings: deque[Finding] = deque()
         """What is to be told."""
+        self.bells: list[Callable[[], None]] = []
+        """What is called when something has come, by any thread."""
         self.closed = False
         self._woken = False
         self._fresh = False
@@ -79,6 +81,11 @@ class SpaceMiddleware:
     def owners(self) -> Set[str]:
         """Whom findings about our nodes name."""
         return {node.participant.owner for node in self.nodes}
+
+    @property
+    def served(self) -> bool:
+        """Whether the space can be waited for; else the running asyncio loop serves it, and `bells` ring there."""
+        return self.ground.served
 
     @property
     def came(self) -> bool:

@@ -42,6 +42,9 @@ _EPOLL = selectors.DefaultSelector is getattr(selectors, "EpollSelector", None)
 class Waiter(Protocol):
     """Who waits for something to come."""
 
+    bells: list[Callable[[], None]]
+    """What else is called when something has come, by any thread and with the lock held."""
+
     @property
     def came(self) -> bool:
         """Whether something has come; asked with the lock held."""
@@ -113,6 +116,8 @@ class Server:
 
     def wake(self, waiter: Waiter) -> None:
         """Something has come for `waiter`: end its wait. To be called with the lock held."""
+        for bell in waiter.bells:
+            bell()
         if self._driver is waiter and self._loop is not None:
             self._loop.end()
         elif self._followers:
