@@ -3,6 +3,8 @@
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from muros.interfaces import board, message
 from tests.micropython.runtimes import require
 from tests.micropython.unix import run_mpy
@@ -16,7 +18,7 @@ CLOCK: Any = message("rosgraph_msgs/msg/Clock")
 
 
 def test_no_program_goes_untested() -> None:
-    assert len(programs(GUIDE)) == 2
+    assert len(programs(GUIDE)) == 3
 
 
 def test_logging(bench: Bench) -> None:
@@ -32,9 +34,10 @@ def test_logging(bench: Bench) -> None:
     running.stop()
 
 
-def test_simulated_time(bench: Bench) -> None:
+@pytest.mark.parametrize("number", [1, 2])
+def test_simulated_time(bench: Bench, number: int) -> None:
     publisher = bench.node.publisher(CLOCK, "/clock")
-    running = bench.start(GUIDE, 1)
+    running = bench.start(GUIDE, number)
     now = 5_000
 
     def step() -> None:

@@ -64,6 +64,7 @@ class Options(TypedDict, total=False):
     heartbeat: int
     retry: int
     creation_timeout: int
+    destroy_timeout: int
     keepalive: int
     ping_timeout: int
     ping_attempts: int

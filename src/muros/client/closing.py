@@ -29,13 +29,16 @@ def leave(session: "Session") -> None:
 def close(session: "Session") -> None:
     """Deletes the session at the agent, in at most ten attempts of 100 ms, and closes the transport for good."""
     transport = session.transport
+    left = session.notes.get("destroy_timeout", _ATTEMPTS * _PATIENCE)  # hosts may set it
     try:
-        for _ in range(_ATTEMPTS):
-            if session.login or not session.up:
-                break
+        while not session.login and session.up:
             leave(session)
-            transport.wait(_PATIENCE)
-            transport.receive(session.deliver)
+            if left > 0:
+                transport.wait(min(_PATIENCE, left))
+                transport.receive(session.deliver)
+            left -= _PATIENCE
+            if left <= 0:
+                break
     except OSError:
         pass
     transport.close()

@@ -49,6 +49,7 @@ _LEAST = {
     "ping_timeout": 1,
     "ping_attempts": 1,
     "hard_liveliness": 0,
+    "destroy_timeout": 0,
 }
 """The smallest value of each number among the settings."""
 
@@ -61,7 +62,8 @@ class Session(board.Session):
 
     Raises TypeError and ValueError for wrong arguments. Problems are printed on standard error unless ``on_problem``
     is set. What keeps us from the agent is told once for each cause, and again when the cause has changed or the
-    session was connected meanwhile. A session that is connected when the program ends is closed.
+    session was connected meanwhile. A session that is connected when the program ends is closed. ``close`` waits for
+    the agent at most ``destroy_timeout`` ms; with 0 it says goodbye once and does not wait.
 
     Any thread may use a session and what is made in it, see ``sharing``; ``lock`` is held while one does.
     """
@@ -79,7 +81,10 @@ class Session(board.Session):
         self.lock = threading.RLock()
         self._gate = Turnstile()
         self._pinging = threading.RLock()  # one at a time: they would take each other's answers
+        patience = options.pop("destroy_timeout", None)
         super().__init__(transport, client_key, session_id, mtu, history, **options)
+        if patience is not None:
+            self.notes["destroy_timeout"] = patience
         _remember(self)
 
     @property

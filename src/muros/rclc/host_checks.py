@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from muros.client.qos import Qos, profile
 from muros.rclc.errors import InvalidNameError
 
 INVALID_ARGUMENT = 11
 TOPIC_NAME_INVALID = 103
 SERVICE_NAME_INVALID = 104
+NODE_INVALID_NAMESPACE = 202
 
 
 class WrongTypeError(TypeError):
@@ -56,6 +58,16 @@ def be_service(kind: Any) -> None:
     raise no_class(kind, "a service class such as example_interfaces.srv.AddTwoInts")
 
 
+def be_qos(qos: Any) -> None:
+    """Raises WrongTypeError unless it is a QoS or the name of a profile, WrongValueError for a name that is none."""
+    if not isinstance(qos, str | Qos):
+        raise WrongTypeError(f"qos is the name of a profile such as 'sensor_data', or a Qos, not {qos!r}")
+    try:
+        profile(qos)
+    except ValueError as error:
+        raise WrongValueError(str(error)) from None
+
+
 def no_class(kind: Any, wanted: str) -> WrongTypeError:
     """The error about what is no class that is wanted."""
     if hasattr(kind, "TYPE"):
@@ -89,3 +101,8 @@ def invalid(error: ValueError, code: int) -> InvalidNameError:
     made = InvalidNameError(str(error))
     made.code = code
     return made
+
+
+def is_token(name: str) -> bool:
+    """Whether a name may be that of a node, or a part of a longer one."""
+    return name.isascii() and name.isidentifier()

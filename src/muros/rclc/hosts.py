@@ -13,23 +13,28 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from muros.client.hosts import Session
 from muros.client.names import topic_name
+from muros.client.qos import profile
 from muros.rclc import context as context_
 from muros.rclc import contexts, host_logger, remapping
 from muros.rclc import node as node_
 from muros.rclc.errors import InvalidNameError, RclError
 from muros.rclc.host_checks import (
+    NODE_INVALID_NAMESPACE,
     SERVICE_NAME_INVALID,
     TOPIC_NAME_INVALID,
     WrongTypeError,
     WrongValueError,
     be_callable,
     be_message,
+    be_qos,
     be_service,
     be_text,
     invalid,
+    is_token,
 )
 from muros.rclc.host_entities import Client, Publisher, Service
 from muros.rclc.host_handles import Subscription, Timer, ticks
+from muros.rclc.host_waiting import spin_until
 from muros.rclc.middleware import _engines, open_url
 from muros.rclc.remapping import RosArguments
 
@@ -46,6 +51,8 @@ if TYPE_CHECKING:
     from muros.rclc.host_parameters import Parameters
     from muros.rclc.lifecycle import Lifecycle
     from muros.rclc.logger import Logger
+    from muros.rclc.memory import Rules
+    from muros.rclc.sharing import Sharing
 
 Made = TypeVar("Made", "Client", "Service", "Subscription")
 
@@ -68,6 +75,9 @@ class Context(context_.Context):
 
     Raises TypeError and ValueError, RclError for a space that cannot be had.
     """
+
+    sharing: Sharing | None = None
+    """What stands before the middleware when several threads run the context, see ``groups``."""
 
     arguments: RosArguments
 
@@ -122,6 +132,15 @@ class Context(context_.Context):
         """
         return Node(self, name, namespace, remap, parameters, use_arguments)
 
+    def wait_connected(self, timeout: float | None = None) -> bool:
+        """Waits until the agent is there and has made everything; straight in a space that is at once.
+
+        At most ``timeout`` seconds (None: for ever, or until it is closed); whether it is. No callback runs meanwhile.
+        """
+        return spin_until(
+            self, lambda: self.state == "CONNECTED" and not getattr(self.middleware, "pending", 0), timeout
+        )
+
     on_state = contexts.on_state
     on_problem = contexts.on_problem
     ping = contexts.ping
@@ -152,7 +171,9 @@ class Node(context_.Node):
         name, namespace = remapping.remap_node(name, namespace, self.rules)
         try:
             node_.begin(self, context, name, namespace)
-        except InvalidNameError:
+        except InvalidNameError as error:
+            if is_token(name):
+                error.code = NODE_INVALID_NAMESPACE
             raise
         except ValueError as error:
             raise InvalidNameError(f"node {error}") from None
@@ -166,20 +187,32 @@ class Node(context_.Node):
     def publisher(self, kind: Any, topic: str, qos: str | Qos = "default") -> Publisher:
         """A publisher: ``publish(message)`` returns whether the message was taken."""
         be_message(kind)
+        be_qos(qos)
         return Publisher(self, node_.publisher(self, kind, topic, qos), kind, topic)
 
     def subscription(
-        self, kind: Any, topic: str, callback: Callable[[Any], object] | None, qos: str | Qos = "default"
+        self,
+        kind: Any,
+        topic: str,
+        callback: Callable[[Any], object] | None,
+        qos: str | Qos = "default",
+        memory: Rules | None = None,
     ) -> Subscription:
-        """A subscription; an executor calls ``callback(message)``."""
+        """A subscription; an executor calls ``callback(message)``. ``memory`` bounds what messages take."""
         be_message(kind)
+        be_qos(qos)
         if callback is not None:  # an executor may give one
             be_callable(callback, "the callback of a subscription")
         name = self._topic(topic)
-        made = Subscription(self.context, kind, callback, qos)
+        made = self._subscription(kind, callback, qos)
         made.topic = topic
         reader = self.context.middleware.reader
-        return self._join(made, lambda: reader(self.participant, name, kind.TYPE, qos, made.deliver))
+
+        def read() -> Any:
+            taker = made if memory is None else memory.guard(made, kind)
+            return reader(self.participant, name, kind.TYPE, qos, taker.deliver)
+
+        return self._join(made, read)
 
     def timer(self, period: float, callback: Callable[[], object], autostart: bool = True) -> Timer:
         """A timer; an executor calls ``callback()`` every ``period`` seconds."""
@@ -197,9 +230,10 @@ class Node(context_.Node):
     ) -> Service:
         """A server of a service; ``callback(request)`` returns the response, or None to answer later."""
         be_service(kind)
+        be_qos(qos)
         be_callable(callback, "the callback of a service")
         full = self._resolve(name)
-        made = Service(self.context, kind, callback)
+        made = self._service(kind, callback, qos)
         made.name = full
         replier = self.context.middleware.replier
         self._join(made, lambda: replier(self.participant, made.name, kind.TYPE, made.deliver, qos))
@@ -209,6 +243,7 @@ class Node(context_.Node):
     def client(self, kind: Any, name: str, qos: str | Qos = "services") -> Client:
         """A client of a service."""
         be_service(kind)
+        be_qos(qos)
         full = self._resolve(name)
         made = Client(self.context, kind)
         made.name = full
@@ -258,8 +293,8 @@ class Node(context_.Node):
     def on_events(self, entity: Publisher | Subscription, **callbacks: Callable[[Event], object]) -> Events:
         """Has an executor call ``callback(event)`` when something becomes of a publisher or subscription of ours.
 
-        ``deadline_missed``, ``message_lost``, and straight in a data space ``matched`` and ``incompatible_qos``: an agent
-        does not tell of those (RclError with code 3, unsupported). The handle that it returns ends it with ``destroy()``.
+        ``deadline_missed``, ``message_lost``, and straight in a data space ``matched`` and ``incompatible_qos``: an
+        agent does not tell of those (RclError with code 3, unsupported). ``destroy()`` of the handle ends it.
         """
         from muros.rclc.host_events import make
 
@@ -335,6 +370,22 @@ class Node(context_.Node):
         if made is None:
             made = self.__dict__["_log"] = self.logger()
         return made
+
+    def _subscription(
+        self, kind: Any, callback: Callable[[Any], object] | None, qos: str | Qos
+    ) -> Subscription:
+        if not profile(qos).lifespan:
+            return Subscription(self.context, kind, callback, qos)
+        from muros.rclc.host_expiry import ExpiringSubscription
+
+        return ExpiringSubscription(self.context, kind, callback, qos)
+
+    def _service(self, kind: Any, callback: Callable[[Any], Any], qos: str | Qos) -> Service:
+        if not profile(qos).lifespan:
+            return Service(self.context, kind, callback)
+        from muros.rclc.host_expiry import ExpiringService
+
+        return ExpiringService(self.context, kind, callback, qos)
 
     def _join(self, handle: Made, make: Callable[[], Any]) -> Made:
         """Gives a handle its entity; one that cannot be made leaves nothing behind."""
