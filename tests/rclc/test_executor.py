@@ -170,6 +170,20 @@ def test_x6_remove_keeps_the_order_of_the_others(local: InSpace) -> None:
         assert executor.handles == left
 
 
+def test_one_executor_runs_a_handle(local: InSpace) -> None:
+    topics = Topics(local, 2)
+    first, second = local.executor(), local.executor(trigger=any_of())
+    for subscription in topics.subscriptions:
+        first.add(subscription)
+    second.add(topics.subscriptions[1], lambda message: topics.got.append((7, message.data)))
+    assert (first.handles, second.handles) == (topics.subscriptions[:1], topics.subscriptions[1:])
+    topics.say((0, 1), (1, 2))
+    first.spin_some()
+    assert topics.got == [(0, 1)]
+    second.spin_some()
+    assert topics.got == [(0, 1), (7, 2)]
+
+
 def test_x13_spin_timer(bench: Bench) -> None:
     calls: list[int] = []
     bench.context.node("n").timer(0.1, lambda: calls.append(bench.now))

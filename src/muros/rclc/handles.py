@@ -28,7 +28,7 @@ def add(
     let: float = 0,
     messages: int = 0,
 ) -> None:
-    """Runs a handle from now on, behind those added before; with ``callback`` in place of its own.
+    """Runs a handle from now on, and no other executor does, behind those added before; with ``callback`` if given.
 
     ``when`` ALWAYS calls a subscription in each pass, with None when nothing has come. ``let``, in seconds, is how long
     an executor with LET gives the callback (0: one period), ``messages`` how many one publisher may publish meanwhile
@@ -46,8 +46,9 @@ def add(
         refuse(self, handle)
     if when or hasattr(self, "let"):
         borrow("muros.rclc.periods").prepare(self, handle, when, let, messages)
-    if handle in self.context.handles:
-        self.context.handles.remove(handle)
+    others = handle.handles or self.context.handles
+    if handle in others:
+        others.remove(handle)
     if callback is not None:
         handle.callback = callback
     handle.eager = self.trigger is None

@@ -110,6 +110,8 @@ class Executor(executor_.Executor):
     ) -> None:
         """Runs a handle from now on, behind those added before; with ``callback`` in place of its own.
 
+        One executor runs it: if another one of the context did, that one does no more.
+
         ``when`` ALWAYS calls a subscription in each pass, with None when nothing has come. With LET, ``let`` is how
         many seconds the callback has from the start of the period (0: the period), ``messages`` how many one
         publisher may publish meanwhile (0: as the executor says).
