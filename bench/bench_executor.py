@@ -114,11 +114,11 @@ def run(measure: str, way: str, seconds: float) -> Row:
 
 def print_rates(rows: dict[tuple[str, str], Row], ways: list[str]) -> None:
     """Callbacks per second, and how many times rclpy's that is."""
-    print(f"\n{'callbacks/s':<18}" + "".join(f"{way:>12}{'cpu':>8}" for way in ways) + "   beside rclpy")
+    print(f"\n{'callbacks/s':<18}" + "".join(f"{way:>12}{'cpu':>9}" for way in ways) + "   beside rclpy")
     for measure in RATES:
         line = f"{measure:<18}"
         for way in ways:
-            line += f"{rows[measure, way]['rate']:>12,.0f}{rows[measure, way]['cpu']:>5.1f} us"
+            line += f"{rows[measure, way]['rate']:>12,.0f}{rows[measure, way]['cpu']:>6.1f} us"
         print(line + _ratios(rows, ways, measure, "cpu"))
     print(
         "cpu: microseconds of processor time a callback. Beside rclpy: how many times less of it, which is the rate "
