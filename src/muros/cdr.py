@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
+    Buffer = bytes | bytearray | memoryview
+
 
 class CdrError(ValueError):
     """A message does not fit its type: received bytes are short or malformed, or a value cannot be written."""
@@ -39,7 +41,7 @@ def ended(left: int) -> None:
     need(left, 0)
 
 
-def integer(buf: "bytearray", p: int, size: int, signed: int) -> int:
+def integer(buf: "Buffer", p: int, size: int, signed: int) -> int:
     """The integer of ``size`` bytes at ``p``."""
     i = p + size - 1
     n = buf[i]

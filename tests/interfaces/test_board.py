@@ -345,3 +345,11 @@ def _written(value: Any) -> bytes:
     buffer = bytearray(value.size())
     assert value.write(buffer, 0) == len(buffer)
     return bytes(buffer)
+
+
+def test_shapes_are_there_when_asked_for() -> None:
+    names = ["std_msgs/MultiArrayLayout", "std_msgs/Int32"]
+    path = "std_msgs/msg/_MultiArrayLayout.py"
+    assert 'SHAPE = "dim:[ label:s 4 4 ) 4"' in sources(names, shapes=True)[path]
+    assert 'SHAPE = "4"' in sources(names, shapes=True)["std_msgs/msg/_Int32.py"]
+    assert not any("SHAPE" in text for text in sources(names).values())

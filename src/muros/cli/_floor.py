@@ -20,7 +20,8 @@ Compile = Callable[[str, bytes, str | None], bytes]
 """``compile(path, source, march)`` gives the .mpy file of a source."""
 
 BOARD_FLOOR = (
-    "compat.py", "exports.py", "cdr.py", "cdr_texts.py", "cdr_lists.py", "cdr_rows.py", "xrce", "client", "rclc", "rosserial",
+    "compat.py", "exports.py", "cdr.py", "cdr_texts.py", "cdr_lists.py", "cdr_rows.py",
+    "xrce", "client", "rclc", "rosserial",
 )  # fmt: skip
 """The rooms below ``muros/`` that boards import."""
 
@@ -32,6 +33,7 @@ HOST_ONLY = frozenset(
         "muros/client/sharing.py",
         "muros/rclc/_types.py",
         "muros/rclc/action_hosts.py",
+        "muros/rclc/groups.py",
         "muros/rclc/host_async.py",
         "muros/rclc/host_checks.py",
         "muros/rclc/host_clock.py",
@@ -41,6 +43,7 @@ HOST_ONLY = frozenset(
         "muros/rclc/host_handles.py",
         "muros/rclc/host_let.py",
         "muros/rclc/host_logger.py",
+        "muros/rclc/host_memory.py",
         "muros/rclc/host_parameters.py",
         "muros/rclc/host_waiting.py",
         "muros/rclc/hosts.py",
@@ -48,6 +51,8 @@ HOST_ONLY = frozenset(
         "muros/rclc/outlet.py",
         "muros/rclc/parameter_files.py",
         "muros/rclc/remapping.py",
+        "muros/rclc/scheduling.py",
+        "muros/rclc/sharing.py",
         "muros/rosserial/constants.py",
         "muros/rosserial/server/__init__.py",
         "muros/rosserial/server/_board.py",

@@ -33,6 +33,11 @@ def register(subparsers: Any) -> None:
     copy.add_argument("folder", metavar="DIR", type=Path, help="made if it is not there")
     copy.add_argument("types", nargs="*", metavar="TYPE", help="std_msgs/msg/Int32, or short std_msgs/Int32")
     add_program(copy)
+    copy.add_argument(
+        "--rules",
+        action="store_true",
+        help="classes that memory rules can bound; given by itself when a --program names Rules",
+    )
     copy.add_argument("--mpy", action="store_true", help="compile with mpy-cross")
     copy.add_argument("--march", metavar="ARCH", help="with --mpy: native code for this architecture")
     copy.add_argument(
@@ -64,7 +69,8 @@ def _copy(arguments: argparse.Namespace) -> int:
         for folder in arguments.path:
             interfaces.add_path(folder)
         constants = constants_of(arguments.program)
-        tree = _floor.board_tree() | _types(arguments.types, constants)
+        shapes = arguments.rules or (constants is not None and "Rules" in constants)
+        tree = _floor.board_tree() | _types(arguments.types, constants, shapes)
         left_out = [path for path in tree if _floor.is_native(tree[path])] if arguments.mpy else []
         if arguments.mpy:
             tree = _floor.compiled(tree, arguments.march, _floor.lean_mpy if arguments.lean else None)
@@ -116,10 +122,11 @@ def report_constants(types: list[str], file: TextIO) -> None:
         )
 
 
-def _types(names: list[str], constants: frozenset[str] | None) -> dict[str, bytes]:
+def _types(names: list[str], constants: frozenset[str] | None, shapes: bool) -> dict[str, bytes]:
     from muros.interfaces import board
 
-    return {path: text.encode() for path, text in board.sources(names, True, constants=constants).items()}
+    made = board.sources(names, True, constants=constants, shapes=shapes)
+    return {path: text.encode() for path, text in made.items()}
 
 
 def _replace(tree: dict[str, bytes], folder: Path) -> None:

@@ -25,6 +25,7 @@ from muros.interfaces._api import (
     registry,
     rihs01,
     service,
+    shape,
     source,
     text,
 )
@@ -119,6 +120,7 @@ __all__ = [
     "ros_type_name",
     "service",
     "service_converter",
+    "shape",
     "source",
     "split_type",
     "text",

@@ -11,6 +11,7 @@ from muros.interfaces import _model as model
 from muros.interfaces._model import InterfaceError
 from muros.interfaces._names import split_type
 from muros.interfaces._registry import ENV_PATHS, Registry
+from muros.interfaces._shape import shape as shape_of
 
 
 class ServiceType:
@@ -193,6 +194,12 @@ def md5(name: str) -> str:
 def text(name: str, distro: str | None = None) -> str:
     """The text of a definition followed by those of all nested messages, divided as in bag files."""
     return _hashes.full_text(registry(distro), "/".join(split_type(name)))
+
+
+def shape(name: str, distro: str | None = None) -> str:
+    """The shape of a message as a line of text, by which its size is bounded; see ``muros.interfaces._shape``."""
+    home = registry(distro)
+    return shape_of(home.message("/".join(split_type(name))), home.message)
 
 
 def source(name: str, distro: str | None = None) -> str:

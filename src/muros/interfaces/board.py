@@ -33,6 +33,7 @@ from muros.interfaces._model import (
 )
 from muros.interfaces._names import split_type
 from muros.interfaces._registry import Registry
+from muros.interfaces._shape import shape
 
 ACTION_TYPES = ("action_msgs/srv/CancelGoal", "action_msgs/msg/GoalStatusArray")
 """What all actions have in common."""
@@ -64,16 +65,18 @@ def generate(
     action_services: bool = False,
     registry: Registry | None = None,
     constants: Container[str] | None = None,
+    shapes: bool = False,
 ) -> list[Path]:
     """Writes the modules of the named types and of all they need below a folder; returns the files, sorted.
 
     Types that the folder already has in full stay full. ``action_services`` adds the services and the messages
-    that carry an action. ``constants`` names those to keep; None keeps all but long lists. Raises
-    :class:`InterfaceError` for unknown types and for ``wstring``, which boards do not do.
+    that carry an action. ``constants`` names those to keep; None keeps all but long lists. With ``shapes`` classes
+    have what bounds of memory need, see :mod:`muros.rclc.memory`. Raises :class:`InterfaceError` for unknown types and
+    for ``wstring``, which boards do not do.
     """
     root = Path(folder)
     written: set[Path] = set()
-    for path, text in sources(names, action_services, registry, root, constants).items():
+    for path, text in sources(names, action_services, registry, root, constants, shapes).items():
         target = root / path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text, encoding="utf-8")
@@ -87,9 +90,10 @@ def sources(
     registry: Registry | None = None,
     present: Path | None = None,
     constants: Container[str] | None = None,
+    shapes: bool = False,
 ) -> dict[str, str]:
     """The modules that :func:`generate` writes: path -> text. ``present``: a folder whose full types stay full."""
-    work = _Work(registry or default_registry(), present, constants)
+    work = _Work(registry or default_registry(), present, constants, shapes)
     for name in names:
         work.add(work.registry.full_name(name), action_services)
     return work.files()
@@ -111,8 +115,11 @@ def constants_in(program: str) -> frozenset[str]:
 class _Work:
     """The types to write: which in full, which only as what others hold."""
 
-    def __init__(self, registry: Registry, present: Path | None, constants: Container[str] | None) -> None:
+    def __init__(
+        self, registry: Registry, present: Path | None, constants: Container[str] | None, shapes: bool = False
+    ) -> None:
         self.registry = registry
+        self._shapes = shapes
         self._wanted = constants
         self._present = present
         self._modules: dict[str, list[Message]] = {}  # module path -> messages in it
@@ -228,6 +235,8 @@ class _Work:
         for name in shared:
             functions |= values.maker(name) | shared.functions(name, values.blank)
         lines = [f"class {_short(message.name)}:", f'    TYPE = "{message.name}"']
+        if full and self._shapes:
+            lines.append(f'    SHAPE = "{shape(message, self.registry.message)}"')
         lines += [f"    {attribute(c.name)} = {_literal(c.value)}" for c in self.constants(message)]
         if message.fields:
             lines += self._init(message, values, len(memo.paths) if full else 0)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from muros.rclc.goals import Goal
     from muros.rclc.lifecycle import Callback, Lifecycle
     from muros.rclc.logger import Logger
+    from muros.rclc.memory import Rules
     from muros.rclc.parameters import Parameters
     from muros.rclc.service import Service
     from muros.rclc.subscription import Subscription
@@ -52,15 +53,18 @@ def subscription(
     topic: str,
     callback: "Callable[[Any], object] | None",
     qos: "str | Qos" = "default",
+    memory: "Rules | None" = None,
 ) -> "Subscription":
     """A subscription; an executor calls ``callback(message)``.
 
-    On boards there is one message object, which the next message overwrites: copy what is to be kept.
+    On boards there is one message object, which the next message overwrites: copy what is to be kept. ``memory`` bounds
+    what messages take, see ``Rules``; without it there is no bound.
     """
     from muros.rclc.subscription import Subscription
 
     made = Subscription(self.context, kind, callback)
-    taker: "Any" = made  # a session calls its ``deliver``, which saves the heap a bound method
+    # A session calls its ``deliver``, which saves the heap a bound method.
+    taker: "Any" = made if memory is None else memory.guard(made, kind)
     made.entity = self.context.middleware.reader(self.participant, self._topic(topic), kind.TYPE, qos, taker)
     self.entities.append(made)
     return made
