@@ -571,7 +571,7 @@ def test_an_executor_may_go_on_and_tell(bench: Bench) -> None:
     assert executor.errors == 5
     assert [code for code, _ in told] == [51] * 3, "the 1st, 2nd and 4th"
     assert told[0][1].startswith(
-        "broken, the callback of subscription 'topic_0' raised ZeroDivisionError: the gain is 0 (test_executor.py:"
+        "broken, the callback of subscription 'topic_0', raised ZeroDivisionError: the gain is 0 (test_executor.py:"
     )
     assert told[2][1].endswith("The executor goes on, 4 so far.")
 

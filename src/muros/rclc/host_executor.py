@@ -282,9 +282,7 @@ class Executor(executor_.Executor):
         if callable(self.on_error):
             return bool(self.on_error(handle, error))
         if self.errors & (self.errors - 1) == 0:
-            told = (
-                f"{where or 'a callback'} raised {_line(error)}. The executor goes on, {self.errors} so far."
-            )
+            told = f"{where + ',' if where else 'a callback'} raised {_line(error)}. The executor goes on, {self.errors} so far."
             tell_problem(self.context, CALLBACK, told)
         return True
 
