@@ -18,7 +18,7 @@ def filled(depth: int | None, *instances: bytes, lifespan: int = NEVER) -> Histo
     """A history with one sample for each of `instances`, numbered from 1."""
     history = History(depth)
     for number, instance in enumerate(instances, 1):
-        history.add(Sample(number, b"", instance=instance, expires=min(NEVER, number + lifespan)))
+        history.add(Sample(number, (b"",), instance=instance, expires=min(NEVER, number + lifespan)))
     return history
 
 
@@ -53,7 +53,7 @@ def test_nothing_is_left_of_instances_that_are_dropped() -> None:
 
 def test_an_instance_that_ended_is_forgotten_once_everybody_knows() -> None:
     history = filled(3, b"a", b"b", b"a")
-    history.add(Sample(4, b"", instance=b"a", last=True))
+    history.add(Sample(4, (b"",), instance=b"a", last=True))
     history.end_to(3)
     assert numbers(history) == [1, 2, 3, 4]
     history.end_to(4)
@@ -63,8 +63,8 @@ def test_an_instance_that_ended_is_forgotten_once_everybody_knows() -> None:
 @pytest.mark.parametrize("depth", [1, 3, None])
 def test_an_instance_that_came_back_after_its_end_is_kept(depth: int | None) -> None:
     history = History(depth)
-    history.add(Sample(1, b"", instance=b"a", last=True))
-    history.add(Sample(2, b"", instance=b"a"))
+    history.add(Sample(1, (b"",), instance=b"a", last=True))
+    history.add(Sample(2, (b"",), instance=b"a"))
     history.end_to(2)
     assert numbers(history) == [2]
 
@@ -96,7 +96,7 @@ def test_a_history_holds_what_a_simple_model_holds(
             assert isinstance(what, bytes)
             assert gap is not None
             number += gap  # what was not kept leaves holes
-            history.add(Sample(number, b"", instance=what))
+            history.add(Sample(number, (b"",), instance=what))
             model[number] = what
             same = [n for n, instance in model.items() if instance == what]
             for old in same[: -depth if depth else 0]:

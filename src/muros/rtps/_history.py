@@ -16,14 +16,25 @@ __all__ = ["History", "Sample"]
 
 
 class Sample:
-    """One written sample. `payload` begins with the four bytes of its encapsulation and must not change."""
+    """One written sample. `pieces` together are its payload, which begins with the four bytes of its encapsulation."""
 
-    __slots__ = ("expires", "inline_qos", "instance", "key", "last", "payload", "sequence", "stamp", "to")
+    __slots__ = (
+        "expires",
+        "inline_qos",
+        "instance",
+        "key",
+        "last",
+        "pieces",
+        "sequence",
+        "size",
+        "stamp",
+        "to",
+    )
 
     def __init__(
         self,
         sequence: int,
-        payload: bytes,
+        pieces: tuple[bytes, ...],
         stamp: bytes = b"",
         inline_qos: bytes = b"",
         key: bool = False,
@@ -32,7 +43,9 @@ class Sample:
         expires: int = NEVER,
     ) -> None:
         self.sequence = sequence
-        self.payload = payload
+        self.pieces = pieces
+        self.size = sum(map(len, pieces)) if len(pieces) > 1 else len(pieces[0])
+        """Bytes of the payload."""
         self.stamp = stamp
         """The INFO_TS submessage that says when it was written."""
         self.inline_qos = inline_qos
@@ -46,6 +59,13 @@ class Sample:
         """When the sample's lifespan ends, on the clock of `now`."""
         self.to: tuple[GuidPrefix, EntityId] | None = None
         """The only reader it is for; None = all."""
+
+    @property
+    def payload(self) -> bytes:
+        """In one piece."""
+        if len(self.pieces) > 1:
+            self.pieces = (b"".join(self.pieces),)
+        return self.pieces[0]
 
     def is_for(self, reader: tuple[GuidPrefix, EntityId]) -> bool:
         """Whether the reader shall get it."""

@@ -145,7 +145,7 @@ class LocalWriter(WriterPort):
 
     def write(
         self,
-        payload: bytes,
+        payload: bytes | tuple[bytes, ...],
         now: int,
         *,
         source_time: int | None = None,
@@ -153,9 +153,10 @@ class LocalWriter(WriterPort):
         to: Guid | None = None,
         instance: bytes = b"",
     ) -> int:
-        """Write a sample (encapsulation included); its sequence number, or 0 when there is no room now, as it keeps all
-        or its resource limits say: `on_room` is called when writing is worth trying again. `Trouble` tells when the
-        sample's instance is the reason: one too many (until one is unregistered), or full.
+        """Write a sample (encapsulation included; in pieces, if that saves copying); its sequence number, or 0 when
+        there is no room now, as it keeps all or its resource limits say: `on_room` is called when writing is worth
+        trying again. `Trouble` tells when the sample's instance is the reason: one too many (until one is
+        unregistered), or full.
 
         source_time: ns since 1970. inline_qos: a little-endian parameter list (`muros.rtps.inline_qos`).
         to: only this matched reader gets it (the others learn that it is not for them). instance: key hash of 16

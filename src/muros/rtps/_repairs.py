@@ -95,7 +95,7 @@ class Repairs:
             proxy.wanted[number] = None  # becomes a GAP
             self.waiting[proxy] = None
             return False
-        total = fragments_of(len(sample.payload), self._size)
+        total = fragments_of(sample.size, self._size)
         fragments = [fragment for fragment in event.missing if 1 <= fragment <= total]
         if fragments:
             proxy.wanted[number] = fragments
@@ -130,10 +130,9 @@ class Repairs:
                 sample = self._history.get(number)
                 if sample is None or not sample.is_for(proxy.key):
                     gone.append(number)
-                elif len(sample.payload) + len(sample.inline_qos) <= self._size:
-                    content = data_of(sample, proxy.entity, self._entity)
-                    packet.add(sample.stamp, content)
-                    self._allowance.spend(len(content) * len(proxy.places))
+                elif sample.size + len(sample.inline_qos) <= self._size:
+                    packet.add(sample.stamp, *data_of(sample, proxy.entity, self._entity))
+                    self._allowance.spend(sample.size * len(proxy.places))
                 else:
                     self._send_fragments(packet, proxy, sample, fragments, now)
             for submessage in gaps(proxy.entity, self._entity, sorted(gone)):
@@ -159,13 +158,12 @@ class Repairs:
                 sample = self._history.get(number)
                 if sample is None or sample.to is not None:
                     continue
-                content = data_of(sample, ENTITYID_UNKNOWN, self._entity)
-                if len(content) > self._size:
+                if sample.size + len(sample.inline_qos) > self._size:
                     continue
                 if not self._allowance.allows(now):
                     break
-                packet.add(sample.stamp, content)
-                self._allowance.spend(len(content) * len(places))
+                packet.add(sample.stamp, *data_of(sample, ENTITYID_UNKNOWN, self._entity))
+                self._allowance.spend(sample.size * len(places))
                 for proxy in proxies:
                     proxy.wanted.pop(number, None)
             packet.flush()
@@ -175,7 +173,7 @@ class Repairs:
     ) -> None:
         """Send fragments again, None = all; those beyond the allowance go back to what is wanted."""
         if fragments is None:
-            fragments = range(1, fragments_of(len(sample.payload), self._size) + 1)
+            fragments = range(1, fragments_of(sample.size, self._size) + 1)
         numbers = iter(fragments)
         for number in numbers:
             if not self._allowance.allows(now):

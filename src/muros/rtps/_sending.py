@@ -8,7 +8,7 @@ from muros.rtps._endpoint import Place, Send
 from muros.rtps._history import Sample
 from muros.rtps._reader_proxy import ReaderProxy
 from muros.rtps._values import EntityId, GuidPrefix
-from muros.rtps._wire import data, data_frag, gap, info_dst, split_numbers
+from muros.rtps._wire import data_frag, data_pieces, gap, info_dst, split_numbers
 
 __all__ = ["Allowance", "Packet", "Window", "data_of", "fragment_of", "gaps", "skips_of"]
 
@@ -180,9 +180,11 @@ def gaps(reader: EntityId, writer: EntityId, gone: list[int]) -> list[bytes]:
     return submessages
 
 
-def data_of(sample: Sample, reader: EntityId, writer: EntityId) -> bytes:
-    """The DATA of a sample that fits one."""
-    return data(reader, writer, sample.sequence, sample.payload, inline_qos=sample.inline_qos, key=sample.key)
+def data_of(sample: Sample, reader: EntityId, writer: EntityId) -> tuple[bytes, ...]:
+    """The DATA of a sample that fits one, in pieces: joined once, with all else that goes into the datagram."""
+    return data_pieces(
+        reader, writer, sample.sequence, sample.pieces, sample.size, sample.inline_qos, sample.key
+    )
 
 
 def fragment_of(sample: Sample, number: int, size: int, reader: EntityId, writer: EntityId) -> bytes:
@@ -190,7 +192,7 @@ def fragment_of(sample: Sample, number: int, size: int, reader: EntityId, writer
     payload = sample.payload
     part = payload[(number - 1) * size : number * size]
     return data_frag(
-        reader, writer, sample.sequence, number, 1, size, len(payload), part,
+        reader, writer, sample.sequence, number, 1, size, sample.size, part,
         inline_qos=sample.inline_qos, key=sample.key,
     )  # fmt: skip
 

@@ -48,6 +48,7 @@ __all__ = [
     "acknack",
     "data",
     "data_frag",
+    "data_pieces",
     "gap",
     "guid_of",
     "heartbeat",
@@ -91,11 +92,24 @@ def data(
     `key`: the payload is only the instance's key. Without payload, the inline QoS say all. ValueError when it is
     too large for a submessage: send fragments.
     """
+    return b"".join(data_pieces(reader, writer, sequence, (payload,), len(payload), inline_qos, key))
+
+
+def data_pieces(
+    reader: EntityId,
+    writer: EntityId,
+    sequence: int,
+    payload: tuple[bytes, ...],
+    payload_size: int,
+    inline_qos: bytes,
+    key: bool,
+) -> tuple[bytes, ...]:
+    """The same for a payload in pieces of `payload_size` bytes together; joined they are the submessage."""
     flags = _L | 0x02 if inline_qos else _L
-    if payload:
+    if payload_size:
         flags |= 0x08 if key else 0x04
-    padding = -len(payload) & 3
-    size = 20 + len(inline_qos) + len(payload) + padding
+    padding = -payload_size & 3
+    size = 20 + len(inline_qos) + payload_size + padding
     if size > MAX_SUBMESSAGE:
         raise _too_large(size)
     head = _DATA.pack(
@@ -109,7 +123,7 @@ def data(
         sequence >> 32,
         sequence & _WORD,
     )
-    return b"".join((head, inline_qos, payload, _PADDING[padding]))
+    return (head, inline_qos, *payload, _PADDING[padding])
 
 
 def data_frag(

@@ -238,7 +238,7 @@ class WriterCore:
 
     def write(
         self,
-        payload: bytes,
+        payload: bytes | tuple[bytes, ...],
         now: int,
         source_time: int | None = None,
         inline_qos: bytes = b"",
@@ -250,10 +250,10 @@ class WriterCore:
     ) -> int | None:
         """Write a sample; returns its sequence number, or None when a writer that keeps all has no room now.
 
-        payload: begins with its encapsulation. source_time: ns since 1970. inline_qos: a little-endian parameter
-        list. instance: names the instance of a topic with a key. key: the payload is only the key. last: the
-        instance ends here, and is forgotten when all readers know. to: only this matched reader gets the sample, the
-        others get a GAP.
+        payload: begins with its encapsulation; may come in pieces, which are joined in the datagram. source_time: ns
+        since 1970. inline_qos: a little-endian parameter list. instance: names the instance of a topic with a key.
+        key: the payload is only the key. last: the instance ends here, and is forgotten when all readers know. to:
+        only this matched reader gets the sample, the others get a GAP.
 
         ValueError when the inline QoS are too large, the time does not fit RTPS, or `to` is not matched.
         """
@@ -262,11 +262,12 @@ class WriterCore:
         qos = inline_qos
         if self._with_qos:
             qos = inline_qos[:-SENTINEL_SIZE] + self._endpoint_qos
-        whole = len(payload) + len(qos) <= settings.fragment_size
+        sequence = self.last + 1
+        pieces = payload if isinstance(payload, tuple) else (payload,)
+        sample = Sample(sequence, pieces, stamp, qos, key, instance, last)
+        whole = sample.size + len(qos) <= settings.fragment_size
         if not whole and settings.fragment_size + len(qos) > MAX_SUBMESSAGE - FRAGMENT_HEAD:
             raise ValueError(f"inline QoS of {len(qos)} bytes do not fit beside a fragment")
-        sequence = self.last + 1
-        sample = Sample(sequence, payload, stamp, qos, key, instance, last)
         if to is not None:
             sample.to = split_guid(to)
             if sample.to not in self._proxies:
@@ -373,9 +374,9 @@ class WriterCore:
             self._transmit_to(sample, now)
             return
         self.sent = sample.sequence
-        submessages = [sample.stamp, data_of(sample, ENTITYID_UNKNOWN, self._entity)]
+        submessages = [sample.stamp, *data_of(sample, ENTITYID_UNKNOWN, self._entity)]
         if self._reliable:
-            submessages += self._expect_and_ask(len(sample.payload), now)
+            submessages += self._expect_and_ask(sample.size, now)
         send = self._send
         for place in self._routes:
             send(submessages, None, place)
@@ -383,10 +384,10 @@ class WriterCore:
     def _transmit_to(self, sample: Sample, now: int) -> None:
         """Send a sample that fits a datagram to the one it is for, and tell the others not to wait for it."""
         self.sent = sample.sequence
-        beat = self._expect_and_ask(len(sample.payload), now)
+        beat = self._expect_and_ask(sample.size, now)
         proxy = self._proxies.get(sample.to) if sample.to else None
         if proxy is not None:
-            submessages = [sample.stamp, data_of(sample, proxy.entity, self._entity), *beat]
+            submessages = [sample.stamp, *data_of(sample, proxy.entity, self._entity), *beat]
             for place in proxy.places:
                 self._send(submessages, proxy.prefix, place)
         self._skip(sample, beat)
@@ -411,7 +412,7 @@ class WriterCore:
                 self.sent = unsent[0]
             elif not self._cursor and not self._may_begin(sample, now):
                 return
-            elif len(sample.payload) + len(sample.inline_qos) <= size:
+            elif sample.size + len(sample.inline_qos) <= size:
                 self._transmit(sample, now)
             else:
                 self._leaving = sample
@@ -431,7 +432,7 @@ class WriterCore:
             reader, prefix = sample.to[1], sample.to[0]
             places = proxy.places if proxy is not None else ()
         window, size = self._window, self.settings.fragment_size
-        total = fragments_of(len(sample.payload), size)
+        total = fragments_of(sample.size, size)
         while self._cursor < total:
             if not (self._reliable and window.out < window.end):
                 if not self._may_send(now):
@@ -476,7 +477,7 @@ class WriterCore:
 
         Small ones of a writer that keeps few had better leave at once, for newer ones would push them out.
         """
-        return bool(self._reliable) and (self._history.depth is None or len(sample.payload) >= LARGE)
+        return bool(self._reliable) and (self._history.depth is None or sample.size >= LARGE)
 
     def _may_begin(self, sample: Sample, now: int) -> bool:
         """Whether one more sample may leave: as reliable readers keep up."""

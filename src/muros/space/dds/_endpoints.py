@@ -29,11 +29,22 @@ TIME_END: Final = 0xFFFFFFFF * 10**9
 """ns since 1970 from which on a time does not fit RTPS; boards may say anything."""
 
 
+LARGE: Final = 4096
+"""Bytes from which on it is cheaper not to copy data than to carry them in pieces."""
+
+
 def encapsulated(data: bytes, representation: int = CDR_LE) -> bytes:
     """`data` as a serialized payload."""
     pad = -len(data) & 3
     head = _HEADS[pad] if representation == CDR_LE else representation.to_bytes(2, "big") + bytes((0, pad))
     return head + data + bytes(pad) if pad else head + data
+
+
+def pieces(data: bytes, representation: int) -> tuple[bytes, ...]:
+    """The same in pieces: large data are copied only where they leave."""
+    pad = -len(data) & 3
+    head = _HEADS[pad] if representation == CDR_LE else representation.to_bytes(2, "big") + bytes((0, pad))
+    return head, data, bytes(pad)
 
 
 class DdsWriter(EngineEndpoint):
@@ -75,10 +86,15 @@ class DdsWriter(EngineEndpoint):
         inline_qos = b""
         if related is not None and len(related) == IDENTITY_SIZE:
             inline_qos = rtps.inline_qos(related=related)
-        return self.put(encapsulated(data, representation), source_time, inline_qos) != 0
+        payload = (pieces if len(data) >= LARGE else encapsulated)(data, representation)
+        return self.put(payload, source_time, inline_qos) != 0
 
     def put(
-        self, payload: bytes, source_time: int | None, inline_qos: bytes = b"", to: bytes | None = None
+        self,
+        payload: bytes | tuple[bytes, ...],
+        source_time: int | None,
+        inline_qos: bytes = b"",
+        to: bytes | None = None,
     ) -> int:
         """Write a payload, to all matched readers or one of them; its sequence number, 0 = refused."""
         if self.closed:
