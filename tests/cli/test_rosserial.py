@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from muros import cli
-from muros.cli.rosserial import WrongUseError, parameters_of, parse
+from muros.cli._rosserial_options import WrongUseError, parameters_of, parse, take_settings
 from muros.rosserial.node_handle import NodeHandle
 from muros.rosserial.tcp import Tcp
 from muros.rosserial.types import message
@@ -51,15 +51,17 @@ def test_a_board_dials_in_and_everything_is_said(tmp_path: Path) -> None:
         node.loginfo("LEDs are ready")
         node.spin_once(10)
         assert process.stdout is not None
-        lines = []
+        awaited = {
+            "Note: subscribe buffer size is 512 bytes",
+            "Setup subscriber on led_out [std_msgs/Byte]",
+            "[INFO] 127.0.0.1: LEDs are ready",
+            "board 127.0.0.1: node /opencr: 1 subscriber",
+        }
         for each in process.stdout:
-            lines.append(re.sub(r"^\[\d\d:\d\d:\d\d\] ", "", each.rstrip("\n")))
-            if "node /opencr" in each:
+            awaited.discard(re.sub(r"^\[\d\d:\d\d:\d\d\] ", "", each.rstrip("\n")))
+            if not awaited:
                 break
-        assert "Note: subscribe buffer size is 512 bytes" in lines
-        assert "Setup subscriber on led_out [std_msgs/Byte]" in lines
-        assert "[INFO] 127.0.0.1: LEDs are ready" in lines
-        assert lines[-1] == "board 127.0.0.1: node /opencr: 1 subscriber"
+        assert not awaited
         process.send_signal(signal.SIGTERM)
         assert process.wait(20) == 0
         while node.connected:  # it was told
@@ -90,6 +92,9 @@ def test_a_port_that_is_not_there_is_awaited(tmp_path: Path) -> None:
         ("tcp", {"tcp": [11411]}),
         ("tcp 12000", {"tcp": [12000]}),
         ("_port:=tcp _tcp_port:=12001", {"tcp": [12001]}),
+        ("--ros1", {"ros1": "", "devices": [], "tcp": []}),
+        ("--ros1 /dev/ttyACM0", {"ros1": "", "devices": ["/dev/ttyACM0"]}),
+        ("--ros1 http://robot:11311 tcp", {"ros1": "http://robot:11311", "tcp": [11411]}),
         ("--tcp --remap a:=b -d 7 --types x", {"remap": {"a": "b"}, "domain": 7, "types": ["x"]}),
     ],
 )  # fmt: skip
@@ -105,6 +110,7 @@ def test_words(line: str, expected: dict[str, object]) -> None:
         ("-D /dev/x -b fast", "'fast' is no rate: write a number such as 57600, or auto"),
         ("ttyACM0", "'ttyACM0' is no port"),
         ("--tcp 70000", "a port is from 0 to 65535"),
+        ("--tcp --space none", "--space none leaves the boards nowhere to be: add --ros1"),
         ("tcp ten", "'ten' is no TCP port"),
         ("--tcp --remap ab", "--remap ab: write OLD:=NEW"),
         ("--tcp --types /nowhere", "/nowhere"),
@@ -115,6 +121,41 @@ def test_wrong_use_is_one_line(line: str, said: str, capsys: pytest.CaptureFixtu
     assert cli.main(["rosserial", *shlex.split(line)]) == 2
     err = capsys.readouterr().err
     assert said in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("line", "settings", "expected"),
+    [
+        ("--ros1", {}, {"devices": ["/dev/ttyUSB0"], "tcp": [], "baud": 57600}),
+        ("--ros1", {"port": "/dev/ttyACM1", "baud": 115200}, {"devices": ["/dev/ttyACM1"], "baud": 115200}),
+        ("--ros1", {"port": "tcp", "tcp_port": 12000}, {"tcp": [12000], "devices": []}),
+        ("--ros1 -b 9600 /dev/x", {"port": "/dev/y", "baud": 115200}, {"devices": ["/dev/x"], "baud": 9600}),
+    ],
+)
+def test_what_is_left_open_is_in_the_parameters_of_a_master(
+    line: str, settings: dict[str, object], expected: dict[str, object]
+) -> None:
+    options = parse(shlex.split(line))
+    take_settings(options, settings.get)
+    assert {name: getattr(options, name) for name in expected} == expected
+
+
+def test_no_master_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    words = [
+        "rosserial",
+        "--tcp",
+        "0",
+        "--bind",
+        "127.0.0.1",
+        "--ros1",
+        "http://127.0.0.1:9",
+        "--space",
+        "none",
+    ]
+    assert cli.main(words) == 1
+    err = capsys.readouterr().err
+    assert "no ROS 1 master" in err
     assert err.count("\n") == 1
 
 

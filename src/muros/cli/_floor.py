@@ -69,6 +69,7 @@ HOST_ONLY = frozenset(
         "muros/rosserial/server/_server.py",
         "muros/rosserial/server/_space_world.py",
         "muros/rosserial/server/_status.py",
+        "muros/rosserial/server/_worlds.py",
         "muros/rosserial/server/events.py",
         "muros/rosserial/types.py",
         "muros/xrce/_crc.py",

@@ -1,34 +1,27 @@
-"""`muros rosserial`: boards with rosserial firmware join the ROS 2 graph, until the command is told to stop.
-
-The words of the ROS 1 servers are understood, too: `PORT` or `tcp` as the first word, `_port:=`, `_baud:=`, `__name:=`,
-`__ns:=`, and `old:=new` for topics.
-"""
+"""`muros rosserial`: boards with rosserial firmware join the ROS 2 graph, and a ROS 1 graph if wanted."""
 
 from __future__ import annotations
 
-import argparse
 import asyncio
 import glob
-import os
-import re
 import signal
 import sys
+import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any, ClassVar, Final
 
 from muros import __version__, interfaces
 from muros.cli._log import DEBUG, GREEN, INFO, PLAIN, WARNING, YELLOW, Log, Message, MurosStyle
+from muros.cli._rosserial_options import Options, WrongUseError, parameters_of, parse, take_settings
 from muros.cli._tap import Tap
 from muros.findings import Finding, Findings
 from muros.interfaces import InterfaceError
 from muros.links import Address, Link, LinkError
-from muros.rclc import parameter_files
 from muros.rclc.parameter_errors import InvalidParameterError
+from muros.ros1 import Ros1Error
 from muros.rosserial.server import (
     BAUD,
     NODE_NAME,
-    TCP_PORT,
     BoardBack,
     BoardGone,
     BoardHeard,
@@ -41,8 +34,8 @@ from muros.rosserial.server import (
     Event,
     LineDown,
     LineUp,
+    Ros1World,
     Server,
-    flat,
     serial_line,
     tcp_line,
 )
@@ -50,41 +43,6 @@ from muros.space import SpaceError, open_space
 
 FAILED: Final = 1
 WRONG_USE: Final = 2
-
-EPILOG: Final = """\
-examples:
-  muros rosserial -D /dev/ttyACM0 -b 57600        one board
-  muros rosserial -D '/dev/ttyACM*' -b auto       whatever is plugged in, at any rate
-  muros rosserial --tcp                           boards that dial in, on port 11411
-  muros rosserial /dev/ttyUSB0 _baud:=115200      as with rosserial_python
-"""
-
-_REMAP: Final = re.compile(r"([^:=]+):=(.*)")
-_NOTHING: Final = "name a port, such as -D /dev/ttyACM0, or --tcp"
-
-
-class WrongUseError(Exception):
-    """The command line is wrong: one line that says what to write."""
-
-
-@dataclass(slots=True)
-class Options:
-    """What the command was told."""
-
-    devices: list[str] = field(default_factory=list)
-    baud: int | None = BAUD
-    """None: to be found out."""
-    tcp: list[int] = field(default_factory=list)
-    host: str | None = None
-    name: str | None = None
-    namespace: str = ""
-    space: str = "dds:"
-    domain: int | None = None
-    remap: dict[str, str] = field(default_factory=dict)
-    parameter_files: list[str] = field(default_factory=list)
-    parameters: dict[str, Any] = field(default_factory=dict)
-    types: list[str] = field(default_factory=list)
-    verbose: int = INFO
 
 
 def run(argv: Sequence[str]) -> int:
@@ -98,143 +56,77 @@ def run(argv: Sequence[str]) -> int:
         return _fail(error, WRONG_USE)
     try:
         asyncio.run(_serve(options, first_parameters))
-    except (LinkError, SpaceError, InterfaceError) as error:
+    except (LinkError, SpaceError, InterfaceError, Ros1Error, WrongUseError) as error:
         return _fail(error, FAILED)
     return 0
-
-
-def parse(argv: Sequence[str]) -> Options:
-    """The options in the words of a command line. Raises WrongUseError; `--help` and wrong options raise SystemExit."""
-    parser = argparse.ArgumentParser(
-        prog="muros rosserial",
-        description="Connect boards with rosserial firmware to the ROS 2 graph.",
-        epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    add = parser.add_argument
-    add("words", nargs="*", metavar="PORT | tcp | NAME:=VALUE", help="as the ROS 1 servers are called")
-    add(
-        "-D",
-        "--dev",
-        action="append",
-        default=[],
-        metavar="DEV",
-        help="a serial port or pattern; may be repeated",
-    )
-    add("-b", "--baud", default=None, metavar="N", help=f"bits per second, or 'auto' (default: {BAUD})")
-    add(
-        "--tcp",
-        action="append",
-        nargs="?",
-        type=int,
-        const=TCP_PORT,
-        default=[],
-        metavar="PORT",
-        help=f"boards dial in here (default: {TCP_PORT})",
-    )
-    add("--bind", metavar="HOST", help="address of this host for --tcp (default: every one)")
-    add(
-        "--name",
-        metavar="NAME",
-        help=f"the board's node (default: {NODE_NAME[1:]}, with several boards and its line)",
-    )
-    add("--namespace", default="", metavar="NS", help="namespace of the nodes")
-    add(
-        "--remap", action="append", default=[], metavar="OLD:=NEW", help="another name for a topic or service"
-    )
-    add("--params-file", action="append", default=[], metavar="FILE", help="parameters of the boards, YAML")
-    add(
-        "--types",
-        action="append",
-        default=[],
-        metavar="FOLDER",
-        help="packages with .msg and .srv of your own",
-    )
-    add(
-        "--space",
-        default="dds:",
-        metavar="URL",
-        help="the data space: dds: (default), dds:42, cyclonedds:, local:",
-    )
-    add("-d", "--domain", type=int, metavar="N", help="DDS domain (default: $ROS_DOMAIN_ID or 0)")
-    add(
-        "-v",
-        "--verbose",
-        type=int,
-        default=INFO,
-        metavar="0-6",
-        help="4 info (default), 5 also each read and write",
-    )
-    parsed = parser.parse_args(list(argv))
-    options = Options(
-        devices=list(parsed.dev),
-        baud=_baud(parsed.baud or str(BAUD)),
-        tcp=list(parsed.tcp),
-        host=parsed.bind,
-        name=parsed.name,
-        namespace=parsed.namespace,
-        space=parsed.space,
-        domain=parsed.domain,
-        parameter_files=list(parsed.params_file),
-        types=list(parsed.types),
-        verbose=parsed.verbose,
-    )
-    for word in parsed.remap:
-        match = _REMAP.fullmatch(word)
-        if match is None:
-            raise WrongUseError(f"--remap {word}: write OLD:=NEW")
-        options.remap[match[1]] = match[2]
-    _classic(parsed.words, options)
-    if not options.devices and not options.tcp:
-        raise WrongUseError(_NOTHING)
-    for port in options.tcp:
-        if not 0 <= port <= 65535:
-            raise WrongUseError(f"--tcp {port}: a port is from 0 to 65535")
-    return options
-
-
-def parameters_of(options: Options) -> Callable[[str], Mapping[str, Any]]:
-    """The first parameters of each board's node: from files of ROS 2, or of ROS 1, which name no node."""
-    import yaml
-
-    trees: list[tuple[str, str, Any]] = []
-    for file in options.parameter_files:
-        try:
-            with open(file, encoding="utf-8") as stream:
-                text = stream.read()
-            trees.append((file, text, yaml.safe_load(text)))
-        except (OSError, UnicodeDecodeError) as error:
-            raise WrongUseError(f"{file}: {getattr(error, 'strerror', None) or error}") from None
-        except yaml.YAMLError as error:
-            raise WrongUseError(f"{file} is no YAML: {' '.join(str(error).split())}") from None
-        if not isinstance(trees[-1][2], dict):
-            raise WrongUseError(f"{file} is no file of parameters: it names none")
-
-    def of(node: str) -> Mapping[str, Any]:
-        found: dict[str, Any] = {}
-        for file, text, tree in trees:
-            if "ros__parameters" in text:
-                for key, values in parameter_files.by_node(text, file):
-                    if parameter_files.matches(key, node):
-                        found.update(values)
-            else:
-                own = tree.get(node.strip("/"), tree)
-                found.update(flat(own if isinstance(own, dict) else tree))
-        return {**found, **options.parameters}
-
-    of(NODE_NAME)  # says now what is wrong with a file
-    return of
 
 
 async def _serve(options: Options, parameters: Callable[[str], Mapping[str, Any]]) -> None:
     log = Log(sys.stdout, RosserialStyle(), verbose=options.verbose)
     findings = Findings()
-    space = open_space(options.space, findings=findings)
-    namespace = options.namespace.strip("/")
-    full = "/".join(["", *filter(None, [namespace, (options.name or NODE_NAME).strip("/")])])
-    single = len(options.devices) == 1 and not options.tcp and not glob.has_magic(options.devices[0])
-    name = full if single or options.name else None
-    server = Server(space, domain=options.domain, node_name=full, remap=options.remap, parameters=parameters)
+    early: list[Event | Finding] = []
+    unwatch = [findings.on_finding(early.append)]
+    full = "/".join(
+        ["", *filter(None, [options.namespace.strip("/"), (options.name or NODE_NAME).strip("/")])]
+    )
+    stop = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop.set)
+    world: Ros1World | None = None
+    if options.ros1 is not None:
+        world = Ros1World(options.ros1, findings=findings, clock=time.time, remap=options.remap)
+        await world.open()
+        take_settings(options, lambda name: world.setting(full, name) if world is not None else None)
+    space = None
+    try:
+        if options.space != "none":
+            space = open_space(options.space, findings=findings)
+        server = Server(
+            space,
+            worlds=[] if world is None else [world],
+            findings=findings,
+            domain=options.domain,
+            node_name=full,
+            remap=options.remap,
+            parameters=parameters,
+        )
+        unwatch.append(server.on_event(early.append))
+        links = _add_links(server, options, full, log)
+        await server.start()
+        try:
+            # The banner comes first: only open links know their ports.
+            places = []
+            if world is not None:
+                places.append(f"ROS 1 at {world.master}")
+            if space is not None:
+                domain = space.domain if options.domain is None else options.domain
+                engine = space.url.partition(":")[0]
+                places.append(f"domain {domain}" if engine == "dds" else f"{engine} space")
+            names = [link.name for link in links]
+            log.started(" · ".join([f"muros rosserial {__version__}", *places, *names]), [])
+            for end in unwatch:
+                end()
+            for each in early:
+                if isinstance(each, Finding):
+                    log.finding(each)
+                else:
+                    log.event(each)
+            server.on_event(log.event)
+            server.on_finding(log.finding)
+            await stop.wait()
+            await server.stop()
+        finally:
+            server.close()
+    finally:
+        if space is not None:
+            space.close()
+        if world is not None:
+            await world.close()
+
+
+def _add_links(server: Server, options: Options, full: str, log: Log) -> list[Link]:
+    """The lines that are asked for. A single port has the node's name for itself."""
 
     def on_message(link: Link, incoming: bool, data: bytes, address: Address) -> None:
         log.message(Message(link.name, link.describe(address), incoming, data))
@@ -242,38 +134,14 @@ async def _serve(options: Options, parameters: Callable[[str], Mapping[str, Any]
     def watched(link: Link) -> Link:
         return Tap(link, on_message) if options.verbose >= DEBUG else link
 
+    single = len(options.devices) == 1 and not options.tcp and not glob.has_magic(options.devices[0])
+    name = full if single or options.name else None
     links: list[Link] = []
     if options.devices:
         line = watched(serial_line(options.devices, options.baud or BAUD))
         links.append(server.add_link(line, name=name, find_baud=options.baud is None))
     links += [server.add_link(watched(tcp_line(port, options.host)), name=name) for port in options.tcp]
-    early: list[Event | Finding] = []
-    unwatch = server.on_event(early.append), server.on_finding(early.append)
-    stop = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stop.set)
-    await server.start()
-    try:
-        # The banner comes first: only open links know their ports.
-        where = f"domain {space.domain if options.domain is None else options.domain}"
-        engine = space.url.partition(":")[0]
-        said = where if engine == "dds" else f"{engine} space"
-        log.started(" · ".join([f"muros rosserial {__version__}", said, *(link.name for link in links)]), [])
-        for end in unwatch:
-            end()
-        for each in early:
-            if isinstance(each, Finding):
-                log.finding(each)
-            else:
-                log.event(each)
-        server.on_event(log.event)
-        server.on_finding(log.finding)
-        await stop.wait()
-        await server.stop()
-    finally:
-        server.close()
-        space.close()
+    return links
 
 
 class RosserialStyle(MurosStyle):
@@ -292,57 +160,6 @@ class RosserialStyle(MurosStyle):
         BoardGone: (INFO, PLAIN),
         BoardLog: (INFO, PLAIN),
     }
-
-
-def _classic(words: Sequence[str], options: Options) -> None:
-    """The words of the ROS 1 servers: a port, or `tcp` and its port; `_parameter:=`, `__name:=` and `old:=new`."""
-    plain = []
-    tcp_port: int | None = None
-    for word in words:
-        match = _REMAP.fullmatch(word)
-        if match is None:
-            plain.append(word)
-            continue
-        key, value = match[1], match[2]
-        if key == "__name":
-            options.name = value
-        elif key == "__ns":
-            options.namespace = value
-        elif key == "_port":
-            plain.insert(0, value)
-        elif key == "_baud":
-            options.baud = _baud(value)
-        elif key == "_tcp_port":
-            tcp_port = _port(value)
-        elif key.startswith("__"):
-            continue  # for the launcher of ROS 1
-        elif key.startswith("_"):
-            import yaml
-
-            options.parameters[key[1:].replace("/", ".")] = yaml.safe_load(value)
-        else:
-            options.remap[key] = value
-    if plain and plain[0] == "tcp":
-        options.tcp.append(_port(plain[1]) if len(plain) > 1 else TCP_PORT if tcp_port is None else tcp_port)
-        plain = plain[2:]
-    elif plain and os.path.sep in plain[0]:
-        options.devices.append(plain.pop(0))
-    if plain:
-        raise WrongUseError(f"{plain[0]!r} is no port: {_NOTHING}")
-
-
-def _baud(word: str) -> int | None:
-    if word == "auto":
-        return None
-    if word.isascii() and word.isdigit() and int(word):
-        return int(word)
-    raise WrongUseError(f"{word!r} is no rate: write a number such as {BAUD}, or auto")
-
-
-def _port(word: str) -> int:
-    if word.isascii() and word.isdigit() and int(word) <= 65535:
-        return int(word)
-    raise WrongUseError(f"{word!r} is no TCP port: write a number such as {TCP_PORT}")
 
 
 def _fail(error: Exception, status: int) -> int:

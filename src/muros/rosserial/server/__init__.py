@@ -10,6 +10,7 @@ from muros.rosserial.server._door import Server as Answerer
 from muros.rosserial.server._limits import Limits
 from muros.rosserial.server._lines import BAUD, BAUDS, TCP_PORT, RawFraming, serial_line, tcp_line
 from muros.rosserial.server._parameters import flat
+from muros.rosserial.server._ros1_world import Ros1World
 from muros.rosserial.server._server import NODE_NAME, Server
 from muros.rosserial.server._space_world import SpaceWorld
 from muros.rosserial.server.events import (
@@ -54,6 +55,7 @@ __all__ = [
     "Publisher",
     "RawFraming",
     "RefusedError",
+    "Ros1World",
     "Server",
     "ServerCore",
     "SpaceWorld",

@@ -95,6 +95,9 @@ class Server(Shape, Protocol):
     def answer(self, request: Any, body: bytes) -> None:
         """Answers the request. Raises BodyError."""
 
+    def fail(self, request: Any, text: str) -> None:
+        """The board does not answer the request, for the reason ``text``; said to the caller where that is possible."""
+
     def close(self) -> None:
         """Takes it out of the world."""
 

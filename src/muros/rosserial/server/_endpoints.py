@@ -242,13 +242,15 @@ class ServiceServer(Endpoint):
             self.server.close()
 
     def _missed(self, now: int) -> None:
+        self._unanswered(f"the board did not answer within {self.board.core.limits.answer} ms")
         self._request = None
         self._late = True
         self.until = now + self.board.core.limits.answer
         self.board.wake(self.until)
-        self._unanswered(f"the board did not answer within {self.board.core.limits.answer} ms")
 
     def _unanswered(self, why: str) -> None:
+        if self.server is not None:
+            self.server.fail(self._request, why)
         self.board.report(
             "call-unanswered",
             subject=self.name,

@@ -21,9 +21,11 @@ from muros.findings import Finding, Findings
 from muros.links import LineAddress, Link, LinkError
 from muros.rosserial.server._board import Board
 from muros.rosserial.server._core import ServerCore
+from muros.rosserial.server._door import RefusedError, World
 from muros.rosserial.server._limits import Limits
 from muros.rosserial.server._lines import BAUD, BAUDS, TCP_PORT, identify, serial_line, tcp_line
 from muros.rosserial.server._space_world import SpaceWorld
+from muros.rosserial.server._worlds import Worlds
 from muros.rosserial.server.events import Event, LineDown
 from muros.space import Space, open_space
 
@@ -40,16 +42,18 @@ _GOODBYE_S = 0.05
 class Server:
     """A rosserial server. Everything it does happens on the thread of the loop that runs it.
 
-    ``space``: a URL (``"dds:"``, the ROS 2 graph; ``"local:"``, only this process) or a space to share with others.
-    Boards are called ``node_name`` and their line's name, where their link gives them no name. ``remap`` gives topics
-    and services other names. ``parameters(node)`` gives the first parameters of the node with that full name.
+    ``space``: a URL (``"dds:"``, the ROS 2 graph; ``"local:"``, only this process), a space to share with others, or
+    None if boards shall only be in ``worlds``, which are such places besides and before the space. Boards are called
+    ``node_name`` and their line's name, where their link gives them no name. ``remap`` gives topics and services of the
+    space other names. ``parameters(node)`` gives the first parameters of the node with that full name.
     ``limits`` are those of the server; single ``fields`` of `Limits` may be given by name instead.
     """
 
     def __init__(
         self,
-        space: str | Space = "dds:",
+        space: str | Space | None = "dds:",
         *,
+        worlds: Sequence[World] = (),
         findings: Findings | None = None,
         domain: int | None = None,
         node_name: str = NODE_NAME,
@@ -58,26 +62,31 @@ class Server:
         limits: Limits | None = None,
         **fields: Any,
     ) -> None:
+        self._owns_space = isinstance(space, str)
         if isinstance(space, str):
-            self.findings = findings or Findings()
-            self.space = open_space(space, findings=self.findings)
-            self._owns_space = True
-        else:
-            self.findings = findings or space.findings
-            self.space = space
-            self._owns_space = False
+            findings = findings or Findings()
+            space = open_space(space, findings=findings)
+        self.space = space
+        self.findings = findings or (Findings() if space is None else space.findings)
         self.node_name = "/" + node_name.strip("/")
         made = replace(limits or Limits(), **fields)
-        self._world = SpaceWorld(
-            self.space,
-            wall=time.time_ns,
-            later=self._later,
-            remap=remap,
-            parameters=parameters,
-            depth=made.depth,
-            domain=domain,
-        )
-        self.core = ServerCore(self._world, self.findings, limits=made, wall=time.time_ns, clock=_now)
+        self._in_space: SpaceWorld | None = None
+        places = list(worlds)
+        if space is not None:
+            self._in_space = SpaceWorld(
+                space,
+                wall=time.time_ns,
+                later=self._later,
+                remap=remap,
+                parameters=parameters,
+                depth=made.depth,
+                domain=domain,
+            )
+            places.append(self._in_space)
+        if not places:
+            raise ValueError("a rosserial server needs a space or a world for its boards")
+        world = places[0] if len(places) == 1 else Worlds(places, self._refused_somewhere)
+        self.core = ServerCore(world, self.findings, limits=made, wall=time.time_ns, clock=_now)
         self.core.on_event = self._tell
         self.core.on_wake = self._arm
         self.core.on_unanswered = self._next_baud
@@ -150,7 +159,8 @@ class Server:
         self._loop = asyncio.get_running_loop()
         self._closed = asyncio.Event()
         try:
-            self.space.attach(self._loop)
+            if self.space is not None:
+                self.space.attach(self._loop)
             for link in self.links:
                 link.open(self._adapters[link])
         except BaseException:
@@ -184,9 +194,10 @@ class Server:
         self._stop()
         for board in list(self.core.boards):
             self.core.remove(board, "the server stops")
-        self._world.close()
+        if self._in_space is not None:
+            self._in_space.close()
         self.findings.flush()
-        if self._owns_space:
+        if self._owns_space and self.space is not None:
             self.space.close()
         if self._closed is not None:
             self._closed.set()
@@ -213,6 +224,16 @@ class Server:
             return False
         board.set_baud(self._adapters[serial].port.identify(address).baud)
         return True
+
+    def _refused_somewhere(self, owner: str, what: str, error: RefusedError) -> None:
+        self.core.report(
+            "refused-in-one-world",
+            who=owner,
+            subject=what,
+            what=f"{what} of {owner} is in one graph and not in another",
+            why=error.why,
+            remedy=error.remedy,
+        )
 
     def _later(self, call: Callable[[], object]) -> None:
         if self._loop is not None:

@@ -392,6 +392,9 @@ class _Server(_Converted):
         except ClosedError:
             return
 
+    def fail(self, request: Any, text: str) -> None:
+        """Services of ROS 2 have no way to say so."""
+
     def close(self) -> None:
         self._replier.close()
 
