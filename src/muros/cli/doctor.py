@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from muros.cli._diagnosis import Level, Result, report
-from muros.cli._tool import CommandError, Tool, add_space_options, fail, run_command, space_url
+from muros.cli._tool import WRONG_USE, CommandError, Tool, add_space_options, fail, run_command, space_url
 
 __all__ = ["examine", "register"]
 
@@ -28,6 +28,17 @@ def register(subparsers: Any) -> None:
         default=("127.0.0.1", XRCE_PORT),
         help=f"where a DDS-XRCE agent should answer over UDP (default: 127.0.0.1:{XRCE_PORT})",
     )
+    parser.add_argument(
+        "--rosserial",
+        metavar="DEVICE",
+        help="look at the board with rosserial firmware on this port instead, such as /dev/ttyACM0",
+    )
+    parser.add_argument(
+        "-b",
+        "--baud",
+        type=int,
+        help="the board's rate; without it the usual ones are tried",
+    )
     parser.add_argument("-q", "--quiet", action="store_true", help="leave out what is fine")
     parser.set_defaults(run=_run, command=examine)
 
@@ -36,6 +47,10 @@ def _run(arguments: argparse.Namespace) -> int:
     """The host first, so that it is told of even if the space cannot be opened."""
     from muros.cli._host_checks import host_checks
 
+    if arguments.rosserial:
+        return _look_at_board(arguments)
+    if arguments.baud is not None:
+        return fail("-b goes with --rosserial DEVICE", WRONG_USE)
     try:
         rest = space_url(arguments.space, arguments.domain).partition(":")[2]
     except CommandError as error:
@@ -48,6 +63,14 @@ def _run(arguments: argparse.Namespace) -> int:
     if told.tool is None:  # the space could not be opened, which was told
         told.counts[Level.WRONG] += 1
     return max(status, told.end())
+
+
+def _look_at_board(arguments: argparse.Namespace) -> int:
+    from muros.cli._rosserial_checks import board_checks
+
+    told = _Told(arguments.quiet)
+    told.tell(board_checks(arguments.rosserial, arguments.baud))
+    return told.end()
 
 
 class _Told:
