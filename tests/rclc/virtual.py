@@ -40,6 +40,7 @@ class InSpace(Bench):
     def __init__(self) -> None:
         self.now = 1000
         self._space = open_space("local:", clock=lambda: self.now * 1_000_000)
+        self._opened: list[Context] = []
         self.waits: list[float] = []
         self.on_wait: Callable[[], object] | None = None
         self.talker, self.context = self.open(), self.open()
@@ -50,6 +51,7 @@ class InSpace(Bench):
         made.clock = lambda: self.now
         middleware: Any = made.middleware
         middleware.wait = self._wait
+        self._opened.append(made)
         return made
 
     def _wait(self, ms: float) -> None:
@@ -67,7 +69,8 @@ class InSpace(Bench):
 
     def close(self) -> None:
         """Ends it."""
-        super().close()
+        for context in self._opened:
+            context.close()
         self._space.close()
 
 

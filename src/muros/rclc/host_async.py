@@ -61,10 +61,14 @@ async def pause(executor: Executor, timeout: float) -> None:
             if executor.sleeper is None:
                 executor.sleeper = Sleeper(executor)
             executor.sleeper.wait(loop, middleware, timeout, came)
+            by_thread = True
             try:
-                await came
+                by_thread = await came
+            except asyncio.CancelledError:
+                by_thread = False
+                raise
             finally:
-                if came.cancelled() or not came.result():
+                if not by_thread:
                     executor.wake()  # the thread waits still
         else:
             await _ring(loop, middleware, timeout, came)
@@ -106,16 +110,22 @@ def _sleep(orders: queue.SimpleQueue[Any]) -> None:
     """What the thread does."""
     while (order := orders.get()) is not None:
         loop, middleware, timeout, seen, came = order
+        error: BaseException | None = None
         try:
             if seen is not None:
                 middleware.adopt(seen)
             middleware.wait(timeout if seen is None else max(1, int(timeout)))
-        finally:
-            with suppress(RuntimeError):  # the loop is closed
-                loop.call_soon_threadsafe(_settle, came, True)
-        del order, loop, middleware, came
+        except BaseException as raised:
+            error = raised
+        with suppress(RuntimeError):  # the loop is closed
+            loop.call_soon_threadsafe(_settle, came, True, error)
+        del order, loop, middleware, came, error
 
 
-def _settle(came: Came, by_thread: bool) -> None:
-    if not came.done():
+def _settle(came: Came, by_thread: bool, error: BaseException | None = None) -> None:
+    if came.done():
+        return
+    if error is None:
         came.set_result(by_thread)
+    else:
+        came.set_exception(error)

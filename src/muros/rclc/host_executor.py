@@ -180,11 +180,17 @@ class Executor(executor_.Executor):
 
     def spin_some(self, timeout: float = 0.0) -> bool:
         """Waits up to ``timeout`` seconds until something is ready and makes one pass; whether anything ran."""
-        if self.work(self.context.clock(), timeout <= 0):
-            return True
-        return timeout > 0 and self._drive(self._round(timeout * 1000))
+        if timeout > 0:
+            return self._drive(self._round(timeout * 1000))
+        ran = self.work(self.context.clock(), True)
+        self.stopped = False
+        return ran
 
     spin_once = spin_some
+
+    def round(self, timeout: int) -> bool:
+        """``spin_some`` with ``timeout`` in ms."""
+        return self.spin_some(timeout / 1000)
 
     def spin_until(self, condition: Callable[[], object], timeout: float | None = None) -> bool:
         """Runs until ``condition()`` is true, at most ``timeout`` seconds; whether it is."""
@@ -228,7 +234,7 @@ class Executor(executor_.Executor):
     def stop(self) -> None:
         """Ends what spins when the callback that runs, or with LET the period, is over; from any thread.
 
-        Called while nothing spins it ends the next ``spin`` at once. The context stays open.
+        Called while nothing spins it ends the next one as soon as it would wait. The context stays open.
         """
         self.stopped = True
         self.wake()
@@ -282,7 +288,8 @@ class Executor(executor_.Executor):
         if callable(self.on_error):
             return bool(self.on_error(handle, error))
         if self.errors & (self.errors - 1) == 0:
-            told = f"{where + ',' if where else 'a callback'} raised {_line(error)}. The executor goes on, {self.errors} so far."
+            who = f"{where}," if where else "a callback"
+            told = f"{who} raised {_line(error)}. The executor goes on, {self.errors} so far."
             tell_problem(self.context, CALLBACK, told)
         return True
 
@@ -302,7 +309,6 @@ class Executor(executor_.Executor):
         while self._going():
             yield from self._round(self.timeout)
             yield 0.0
-        self.stopped = False
 
     def _round(self, timeout: float) -> Steps[bool]:
         context = self.context
@@ -323,7 +329,6 @@ class Executor(executor_.Executor):
         while not condition():
             left = end - self.context.clock()
             if left <= 0 or not self._going():
-                self.stopped = False
                 return False
             yield from self._round(min(left, self.timeout))
             yield 0.0
@@ -335,7 +340,6 @@ class Executor(executor_.Executor):
             while self._going():
                 yield from self._one_period(period)
                 yield 0.0
-            self.stopped = False
         finally:
             if self.let is not None:
                 self.let.close()
@@ -379,6 +383,8 @@ class Executor(executor_.Executor):
         except StopIteration as done:
             result: Result = done.value
             return result
+        finally:
+            self.stopped = False
 
     async def _drive_async(self, steps: Steps[Result]) -> Result:
         """Has the running asyncio loop go on between the steps."""
@@ -388,6 +394,8 @@ class Executor(executor_.Executor):
         except StopIteration as done:
             result: Result = done.value
             return result
+        finally:
+            self.stopped = False
 
     def _wait(self, left: float) -> None:
         """Waits until something may have come, at most so many ms."""

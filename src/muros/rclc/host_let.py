@@ -57,13 +57,14 @@ class HostTask(Task):
 class HostOutputs:
     """What callbacks send, held back for each thread."""
 
-    def open(self, task: HostTask) -> None:
-        """From now on what this thread sends is held back."""
-        outlet.task = task
+    def open(self, task: HostTask) -> HostTask | None:
+        """From now on what this thread sends is held back; by whom it was before."""
+        outer, outlet.task = outlet.task, task
+        return outer
 
-    def close(self) -> None:
-        """No more."""
-        outlet.task = None
+    def close(self, outer: HostTask | None) -> None:
+        """No more, but by whom it was before."""
+        outlet.task = outer
 
     def flush(self, task: HostTask) -> None:
         """Has everything leave that waits."""
@@ -127,12 +128,22 @@ class HostLet(Let):
         if executor.on_overrun is not None:
             executor.on_overrun(self.task(task.handle), late / 1000)
         if task.overruns & (task.overruns - 1) == 0:
-            tell_problem(
-                executor.context,
-                OVERRUN,
-                f"{describe(task.handle)}, ended {late:.3g} ms behind its let of {task.let or self.period:g} ms; "
-                f"{task.overruns} so far. Give it less to do, or more time: add(..., let=), Executor(..., period=).",
-            )
+            tell_problem(executor.context, OVERRUN, self._told(self.task(task.handle), late))
+
+    def _told(self, task: HostTask, late: float) -> str:
+        """An overrun in words, with its cause."""
+        let = task.let or self.period
+        if not task.done:
+            what = f"has not ended {late:.3g} ms behind its let of {let:g} ms and goes on with low priority"
+        else:
+            what = f"took {task.took:.3g} ms and ended {late:.3g} ms behind its let of {let:g} ms"
+        cause = "Give it less to do, or more time"
+        if task.done and task.took < let:
+            cause = "Those before it left it too little: give them less to do, or it more time"
+        return (
+            f"{describe(task.handle)}, {what}; {task.overruns} so far. "
+            f"{cause}: add(..., let=), Executor(..., period=)."
+        )
 
     def close(self) -> None:
         """Ends the worker; a callback that has not ended does so by itself."""
@@ -224,14 +235,16 @@ class _Worker:
         let = self._let
         while (task := self.tasks.get()) is not None:
             self.current = task
-            let.outputs.open(task)
+            outer = let.outputs.open(task)
+            begun = let.executor.context.clock()
             try:
                 let.run(task)
             except Exception as error:
                 task.error = error
             finally:
-                let.outputs.close()
+                let.outputs.close(outer)
                 task.input = None
                 task.finished = let.executor.context.clock()
+                task.took = task.finished - begun
                 self.current = None
                 task.done = True

@@ -50,6 +50,7 @@ class Task:
 
     state = "INACTIVE"
     result = "NO_ERROR"
+    took = 0  # ms, the last run
     overruns = 0
     skipped = 0
     lost = 0
@@ -69,7 +70,7 @@ class Task:
 class Let:
     """The periods of an executor, in ms.
 
-    ``outputs`` holds back what is published from ``open(task)`` to ``close()``, and lets it leave at ``flush(task)``.
+    ``outputs`` holds back what is published from ``open(task)`` to ``close(what open gave)``, until ``flush(task)``.
     """
 
     def __init__(
@@ -86,6 +87,7 @@ class Let:
         self._number = 0
         self._start = 0
         self._skip = False
+        self._calling = False
 
     def task(self, handle: "Any") -> Task:
         """The task of a handle, made at the first need."""
@@ -115,6 +117,14 @@ class Let:
         self._start = now
         self._timed = timed
         executor = self.executor
+        if self._calling:
+            from muros.rclc.errors import RclError
+
+            raise RclError("an executor with LET cannot be spun by one of its callbacks")
+        if len(self._tasks) > len(executor.handles):
+            for handle in list(self._tasks):
+                if handle not in executor.handles:
+                    self.drop(handle)
         if self._skip:
             self._skip = False
             return False
@@ -145,9 +155,13 @@ class Let:
         """Calls what was released."""
         while self._released:
             task = self._released.pop(0)
+            clock = self.executor.context.clock
+            begun = clock()
             self.call(task)
             if self._timed:
-                late = ticks_diff(self.executor.context.clock(), self._start) - (task.let or self.period)
+                now = clock()
+                task.took = ticks_diff(now, begun)
+                late = ticks_diff(now, self._start) - (task.let or self.period)
                 if late > 0:
                     self.late(task, late)
 
@@ -155,7 +169,8 @@ class Let:
         """Calls the callback of a task."""
         task.state = "RUNNING"
         task.result = "NO_ERROR"
-        self.outputs.open(task)
+        self._calling = True
+        outer = self.outputs.open(task)
         try:
             self.run(task)
         except Exception as error:
@@ -165,7 +180,8 @@ class Let:
                 self.cancel()
                 raise
         finally:
-            self.outputs.close()
+            self.outputs.close(outer)
+            self._calling = False
             task.input = None
 
     def run(self, task: Task) -> None:
@@ -212,8 +228,8 @@ class Let:
         if told is not None and task.overruns & task.overruns - 1 == 0:
             told(
                 OVERRUN,
-                "a callback ended %d ms behind its let of %d ms, for the %d. time"
-                % (late, task.let or self.period, task.overruns),
+                "a callback took %d ms and ended %d ms behind its let of %d ms, for the %d. time"
+                % (task.took, late, task.let or self.period, task.overruns),
             )
 
     def finish(self) -> None:
@@ -236,17 +252,17 @@ class Outputs:
     def __init__(self, session: "Any") -> None:
         self.session = session
         self._task: "Any" = None
-        self._backlog: "Any" = None
 
-    def open(self, task: Task) -> None:
+    def open(self, task: Task) -> "Any":
         """From now on everything is held back."""
         self._task = task
-        self._backlog = self.session.backlog
+        backlog = self.session.backlog
         self.session.backlog = self
+        return backlog
 
-    def close(self) -> None:
+    def close(self, backlog: "Any") -> None:
         """No more."""
-        self.session.backlog = self._backlog
+        self.session.backlog = backlog
 
     def defer(self, writer: "Any", message: "Any", n: int) -> bool:
         """Takes a sample. CapacityError when the writer has published too many."""

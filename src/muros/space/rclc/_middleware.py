@@ -183,8 +183,8 @@ class SpaceMiddleware:
         """
         if not self.ground.served:
             raise RclError(
-                "waiting would stop the asyncio loop that serves this space: call spin_some() from a task, "
-                "with `await asyncio.sleep(...)` between the calls, or give the context a space of its own"
+                "waiting would stop the asyncio loop that serves this space: have a task `await "
+                "executor.spin_async()` (or spin_some_async), or give the context a space of its own"
             )
         if self.closed:
             time.sleep(timeout / 1000)
