@@ -27,16 +27,9 @@ class Keeper:
     """
 
     __slots__ = (
-        "_lagging",
-        "_on_room",
-        "_refused",
-        "_refused_at",
-        "_settings",
-        "_tell",
-        "history",
-        "lifespan",
+        "_is_limited", "_lagging", "_on_room", "_refused", "_refused_at", "_settings", "_tell", "history", "lifespan",
         "retains",
-    )
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -56,6 +49,7 @@ class Keeper:
         self._settings = settings
         self._tell = tell
         self._on_room = on_room
+        self._is_limited = settings.limit_of_one > 0  # beside the limit of all
         self._refused: bytes | None = None  # the instance a sample of which was refused, ...
         self._refused_at = 0  # ... and when
 
@@ -73,16 +67,10 @@ class Keeper:
         if self.lifespan:
             sample.expires = now + self.lifespan
             self.history.expire(now)
-        instance = sample.instance
-        ends = (
-            sample.key and self.history.depth is not None
-        )  # an end of an instance makes room sooner or later
-        if self._is_full(instance) and not ends and not self._make_room(instance, sent, now):
-            if self._refused is None:
-                self._refused = instance
-                self._refused_at = now
+        history = self.history
+        if (self._is_limited or len(history) >= self._settings.limit) and not self._admits(sample, sent, now):
             return False
-        self.history.add(sample)
+        history.add(sample)
         return True
 
     def release(self, sent: int, now: int) -> None:
@@ -111,6 +99,19 @@ class Keeper:
         return min((self._tolerated(proxy) for proxy in self._lagging if not proxy.aside), default=NEVER)
 
     # --- Helpers -----------------------------------------------------------------------------------------
+
+    def _admits(self, sample: Sample, sent: int, now: int) -> bool:
+        """Whether there is room, after looking closely."""
+        instance = sample.instance
+        # What ends an instance makes room sooner or later.
+        if not self._is_full(instance) or (sample.key and self.history.depth is not None):
+            return True
+        if self._make_room(instance, sent, now):
+            return True
+        if self._refused is None:
+            self._refused = instance
+            self._refused_at = now
+        return False
 
     def _is_full(self, instance: bytes) -> bool:
         settings, history = self._settings, self.history
