@@ -87,13 +87,16 @@ def finish(buf: bytearray, off: int, topic_id: int, n: int, version: int = _VERS
 class Decoder:
     """Takes the bytes of a line as they come and hands on the payloads of good frames.
 
-    ``on_frame(topic_id, buf, off, n)`` is called for each; ``buf[off:off + n]`` is valid until it returns.
+    ``on_frame(topic_id, buf, off, n)`` is called for each; ``buf[off:off + n]`` is valid until it returns. When it
+    returns False, the frame makes no sense: it may be damage that the checksum lets through, and the search goes on
+    inside it.
     ``capacity`` is the longest payload taken, in bytes; ``limit`` may be lowered to what was negotiated, so that
     a damaged length shows at once. ``version`` is what is spoken, or ``ANY_VERSION``; ``heard`` is the version of the
     last good frame. ``byte_us`` is how long a byte takes on the line, in microseconds, 0 if that is no matter.
 
-    Counters: ``frames`` good ones, ``bad_checksum``, ``bad_length`` (the length's checksum), ``too_long`` (beyond
-    ``limit``), ``cut`` (given up before they were complete), ``garbage`` bytes outside good frames.
+    Counters: ``frames`` good ones, ``refused`` by ``on_frame``, ``bad_checksum``, ``bad_length`` (the length's
+    checksum), ``too_long`` (beyond ``limit``), ``cut`` (given up before they were complete), ``garbage`` bytes outside
+    good frames.
     """
 
     def __init__(
@@ -109,6 +112,7 @@ class Decoder:
         self.heard = 0
         self.byte_us = byte_us
         self.frames = 0
+        self.refused = 0
         self.bad_checksum = 0
         self.bad_length = 0
         self.too_long = 0
@@ -182,13 +186,19 @@ class Decoder:
                 continue
             size = self._look(off, end)
             if size > 0:
-                self.frames += 1
                 self.heard = version = buf[off + 1]
+                taken: object = None
                 if self.on_frame is not None:
                     if version == _VERSION_HYDRO:
-                        self.on_frame(buf[off + 5] | buf[off + 6] << 8, buf, off + 7, size - 8)
+                        taken = self.on_frame(buf[off + 5] | buf[off + 6] << 8, buf, off + 7, size - 8)
                     else:
-                        self.on_frame(buf[off + 2] | buf[off + 3] << 8, buf, off + 6, size - 7)
+                        taken = self.on_frame(buf[off + 2] | buf[off + 3] << 8, buf, off + 6, size - 7)
+                if taken is False and self._credit >= 0:
+                    self.refused += 1
+                    self.garbage += 1
+                    off += 1
+                    continue
+                self.frames += 1
                 off += size
                 continue
             if size == _MORE:

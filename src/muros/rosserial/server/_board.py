@@ -17,8 +17,8 @@ What a request names again stays as it is: nobody in the graph sees a board's re
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Hashable
+from typing import TYPE_CHECKING
 
 from muros.rosserial.constants import (
     ID_FIRST_TOPIC,
@@ -158,7 +158,7 @@ class Board:
         """From the last topic request to its first answer, in ms."""
         self.suspicions = Suspicions(self)
         self._now = 0
-        self._incoming: dict[int, Any] = {}
+        self._incoming: dict[int, Callable[[bytes, int], bool]] = {}
         self._halves: dict[tuple[int, str], dict[int, TopicInfo]] = {}
         self._round = 0
         self._open_asks: list[int] = []
@@ -438,23 +438,23 @@ class Board:
 
     # Frames
 
-    def _on_frame(self, topic_id: int, buf: Buffer, off: int, n: int) -> None:
+    def _on_frame(self, topic_id: int, buf: Buffer, off: int, n: int) -> bool:
+        """A frame; False if it makes no sense."""
         now = self._now
         if self.decoder.version != self.decoder.heard and not self._learn(topic_id):
-            return
+            return False
         self.heard_at = now
         receive = self._incoming.get(topic_id)
         if receive is not None:
             if self.state == SILENT:
                 self._heard_again(now)
                 self._step(ANSWER)
-            receive(bytes(memoryview(buf)[off : off + n]), now)
-            return
+            return receive(bytes(memoryview(buf)[off : off + n]), now)
         if self.state == SILENT and topic_id != ID_TIME:
             self._heard_again(now)
             self._step(ANSWER)
         try:
-            self._protocol(topic_id, buf, off, n, now)
+            return self._protocol(topic_id, buf, off, n, now)
         except MessageError as error:
             self.report(
                 "bad-protocol-message",
@@ -465,6 +465,7 @@ class Board:
             self._misses = 0
             self._settle_at = now + self.core.limits.settle
             self._damage = -1
+            return False
 
     def _learn(self, topic_id: int) -> bool:
         """Which version the board speaks; False if that frame is more likely noise."""
@@ -477,7 +478,7 @@ class Board:
             self.core.tell(BoardHeard(self.label, heard, self.baud))
         return True
 
-    def _protocol(self, topic_id: int, buf: Buffer, off: int, n: int, now: int) -> None:
+    def _protocol(self, topic_id: int, buf: Buffer, off: int, n: int, now: int) -> bool:
         if topic_id == ID_TIME:
             self._time(now)
         elif topic_id in _BRANCHES:
@@ -489,6 +490,8 @@ class Board:
             self._parameter(parameter_request_untrusted(buf, off, n))
         else:
             self._strange(topic_id, now)
+            return False
+        return True
 
     def _time(self, now: int) -> None:
         """Answers with the time at which the request left the board, as the board adds the whole round trip to it."""
@@ -703,5 +706,6 @@ class Board:
             self._plan(now)
 
 
-def _pass_over(body: bytes, now: int) -> None:
+def _pass_over(body: bytes, now: int) -> bool:
     """What comes on a refused topic; the refusal was said."""
+    return True

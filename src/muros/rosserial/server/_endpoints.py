@@ -95,12 +95,14 @@ class Publication(Endpoint):
         self.publisher = publisher
         self._publish = publisher.publish
 
-    def receive(self, body: bytes, now: int) -> None:
-        """A message of the board."""
+    def receive(self, body: bytes, now: int) -> bool:
+        """A message of the board; False if it is none."""
         try:
             self._publish(body)
         except BodyError as error:
             self.malformed(error, "from")
+            return False
+        return True
 
     def close(self) -> None:
         """Takes it out of the world."""
@@ -210,7 +212,7 @@ class ServiceServer(Endpoint):
                 board.wake(self.until)
                 return
 
-    def receive(self, body: bytes, now: int) -> None:
+    def receive(self, body: bytes, now: int) -> bool:
         """An answer of the board."""
         waiting, late = self.until is not None, self._late
         self.until = None
@@ -229,6 +231,7 @@ class ServiceServer(Endpoint):
             )
         self._request = None
         self.turn(now)
+        return True
 
     def restart(self) -> None:
         """The board does not know of the call any more."""
@@ -276,7 +279,7 @@ class ServiceClient(Endpoint):
         """Its counterpart is there."""
         self.caller = self.shape = caller
 
-    def receive(self, body: bytes, now: int) -> None:
+    def receive(self, body: bytes, now: int) -> bool:
         """A request of the board."""
         assert self.caller is not None
         if not self.caller.ready:
@@ -301,6 +304,7 @@ class ServiceClient(Endpoint):
         early, self._early = self._early, []
         for answer in early:
             self.on_reply(*answer)
+        return True
 
     def on_reply(self, number: int, body: bytes) -> None:
         """An answer for the board. Those to calls that it made before it started again are dropped."""
