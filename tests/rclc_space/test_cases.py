@@ -440,3 +440,17 @@ def test_every_error_has_a_return_code_of_the_c_library() -> None:
     assert found["ParameterMemoryError"] == CODES["rclc"]["PARAMETER_UNSUPORTED_ON_LOW_MEM"]
     assert found["ParameterChangingError"] == CODES["rclc"]["PARAMETER_DISABLED_ON_CALLBACK"]
     assert issubclass(InvalidNameError, ValueError)
+
+
+def test_what_is_destroyed_is_forgotten(stage: Stage) -> None:
+    node = stage.node("one")
+    kept = node.publisher(Int32, "kept")
+    for n in range(30):
+        made: list[Any] = [MAKERS[case](node, n) for case in MAKERS]
+        made.append(node.timer(1.0, nothing))
+        for one in made:
+            one.destroy()
+    assert len(node.entities) == 1
+    node.destroy()
+    assert node.entities == []
+    del kept

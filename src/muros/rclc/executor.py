@@ -117,6 +117,7 @@ class Handle:
     if TYPE_CHECKING:
         cancelled: bool
         depth: int
+        home: "list[Any]"  # what its node has made; on hosts
 
         def destroy(self) -> None:
             """Takes it away, with all that waits."""

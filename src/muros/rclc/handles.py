@@ -1,6 +1,6 @@
 """What programs ask of executors and of what they run now and then. Boards borrow this."""
 
-from muros.compat import borrow, const, ticks_add, ticks_diff
+from muros.compat import MPY, borrow, const, ticks_add, ticks_diff
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -95,6 +95,8 @@ def destroy(self: "Handle") -> None:
     for name in ("_waiting", "_answers", "_asked"):
         if hasattr(self, name):
             getattr(self, name).clear()
+    if not MPY and self in self.__dict__.get("home", ()):
+        self.home.remove(self)
 
 
 def exchange_period(self: "Timer", period: float) -> float:

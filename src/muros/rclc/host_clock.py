@@ -49,6 +49,7 @@ class Clock(RosTime):
         """A timer that goes by this clock: by the steady one while time is not simulated."""
         made = ClockTimer(self, period, callback, autostart)
         self.timers.append(made)
+        made.home = self.node.entities
         self.node.entities.append(made)
         return made
 
@@ -62,8 +63,6 @@ class Clock(RosTime):
         if simulated:
             self.subscription = self.node.subscription(clock_class(), "/clock", self._on_clock, "sensor_data")
         else:
-            if self.subscription in self.node.entities:
-                self.node.entities.remove(self.subscription)
             self.subscription.destroy()
         for timer in self.timers:
             timer.begin_anew()

@@ -85,6 +85,7 @@ class Events(Handle):
         past = (MATCHED, INCOMPATIBLE_QOS)  # what was there before is told as well
         self._told = {name: 0 if name in past else source.count(name, now) for name in callbacks}
         self._present = 0
+        self.home = node.entities
         node.entities.append(self)
 
     def ready(self, now: int) -> bool:

@@ -27,9 +27,17 @@ class Parameters(parameters.Parameters):
     """Called after something may have changed."""
 
     def __init__(
-        self, node: Node, max: int, notify: bool, undeclared: bool, low_memory: bool, longest: int
+        self,
+        node: Node,
+        max: int,
+        notify: bool,
+        undeclared: bool,
+        low_memory: bool,
+        longest: int,
+        kind: Callable[[str], Any] = kind,
+        clock: Callable[[], int] = time.time_ns,
     ) -> None:
-        super().__init__(node, max, notify, undeclared, low_memory, longest, kind, time.time_ns)
+        super().__init__(node, max, notify, undeclared, low_memory, longest, kind, clock)
         self.given: dict[str, Any] = dict(node.overrides)
 
     def declare(

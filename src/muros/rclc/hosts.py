@@ -222,6 +222,7 @@ class Node(context_.Node):
             )
         be_callable(callback, "the callback of a timer")
         made = Timer(self.context, period, callback, autostart)
+        made.home = self.entities
         self.entities.append(made)
         return made
 
@@ -394,6 +395,7 @@ class Node(context_.Node):
         except Exception:
             self.context.handles.remove(handle)
             raise
+        handle.home = self.entities
         self.entities.append(handle)
         return handle
 

@@ -94,8 +94,8 @@ class LifecycleClient:
     def destroy(self) -> None:
         """Takes its clients away."""
         for which in self._clients:
-            self._clients[which].destroy()
             self.node.entities.remove(self._clients[which])
+            self._clients[which].destroy()
         self._clients = {}
 
     def _ask(

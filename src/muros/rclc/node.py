@@ -209,9 +209,10 @@ def logger(
 
 def destroy(self: "Node") -> None:
     """Takes the node and everything made on it away."""
-    for entity in self.entities:
-        entity.destroy()
+    made = self.entities
     self.entities = []
+    for entity in made[:]:
+        entity.destroy()
     self.participant.destroy()
 
 
