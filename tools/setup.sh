@@ -18,13 +18,13 @@ readonly NPM_PACKAGE=@micropython/micropython-webassembly-pyscript
 readonly NPM_VERSION=1.27.0 # the memory budgets were measured with this build
 
 readonly ROS_PEERS="jazzy kilted"
-readonly ROS_PACKAGES="rclpy rmw-fastrtps-cpp std-msgs std-srvs sensor-msgs test-msgs"
+readonly ROS_PACKAGES="rclpy rmw-fastrtps-cpp std-msgs std-srvs sensor-msgs diagnostic-msgs test-msgs"
 readonly ROS_PACKAGE=tests/dds/programs/packages/example_interfaces # ROS 2 from PyPI has no such package
 readonly ROS_PACKAGE_MAKER=tests/dds/programs/ros_package.py
 readonly FASTDDS_PACKAGES="g++ libfastrtps-dev libfastcdr-dev" # Debian's names
 readonly FASTDDS_SOURCE=tests/dds/programs/fastdds.cpp
 
-readonly ROS1_PACKAGES="python3-rosmaster python3-rospy python3-std-msgs python3-sensor-msgs python3-std-srvs" # Debian's names
+readonly ROS1_PACKAGES="python3-rosmaster python3-rospy python3-std-msgs python3-sensor-msgs python3-std-srvs python3-rostopic python3-rosservice python3-rosparam" # Debian's names
 readonly ROSSERIAL_CLIENT="micropython-rosserial==0.2.8 micropython-rosserial-msgs==0.0.1"
 
 export PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_ROOT_USER_ACTION=ignore PIP_NO_INPUT=1

@@ -24,12 +24,16 @@ import pytest
 from muros.ros1 import _xmlrpc
 from tests.dds.peers import ROOT, Peer
 
-__all__ = ["PACKAGES", "Master", "require"]
+__all__ = ["PACKAGES", "Master", "require", "require_tools"]
 
 PYTHON: Final = Path("/usr/bin/python3")
 MASTER: Final = Path("/usr/bin/rosmaster")
 PROGRAM: Final = Path(__file__).resolve().parent / "programs/ros1.py"
-PACKAGES: Final = "python3-rosmaster python3-rospy python3-std-msgs python3-sensor-msgs python3-std-srvs"
+PACKAGES: Final = (
+    "python3-rosmaster python3-rospy python3-std-msgs python3-sensor-msgs python3-std-srvs "
+    "python3-rostopic python3-rosservice python3-rosparam"
+)
+TOOLS: Final = ("rostopic", "rosservice", "rosparam")
 LOGS: Final = ROOT / "build/peers/logs"
 START: Final = 20.0
 """Seconds that a master may take to answer."""
@@ -40,6 +44,17 @@ def require() -> None:
     if MASTER.exists() and Path("/usr/lib/python3/dist-packages/rospy").is_dir():
         return
     reason = f"ROS 1 is not installed (Debian: apt install {PACKAGES})"
+    if os.environ.get("CI") == "true":
+        pytest.fail(reason, pytrace=False)
+    pytest.skip(reason)
+
+
+def require_tools() -> None:
+    """Skips the running test, or fails it under ``CI=true``, unless the commands of ROS 1 are installed."""
+    lacking = [name for name in TOOLS if not Path(f"/usr/bin/{name}").exists()]
+    if not lacking:
+        return
+    reason = f"{', '.join(lacking)} not installed (Debian: apt install {PACKAGES})"
     if os.environ.get("CI") == "true":
         pytest.fail(reason, pytrace=False)
     pytest.skip(reason)
