@@ -25,9 +25,9 @@ PUBLISHER, SUBSCRIPTION, SERVER, CLIENT = range(4)
 class Lab:
     """A world with a client that reads the graph."""
 
-    def __init__(self) -> None:
+    def __init__(self, **session: Any) -> None:
         self.world = World()
-        self.session = self.world.client()
+        self.session = self.world.client(**session)
         self.node = self.session.participant("/lab/board")
         self.got: list[Any] = []
         self.reader: Any = None
@@ -90,6 +90,12 @@ def test_what_it_says() -> None:
     }
     (writer,) = lab.world.space.graph.topic(TOPIC).writers  # type: ignore[union-attr]
     assert str(writer.qos) == "reliable, transient local, keep last 1"
+
+
+def test_a_client_that_creates_in_xml_as_micro_ros_does() -> None:
+    lab = Lab(creation="xml").read()
+    lab.world.run(200)
+    assert list(lab.nodes()) == ["/host", "/lab/board"]
 
 
 def test_changes_that_come_together_are_published_once() -> None:

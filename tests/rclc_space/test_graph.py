@@ -7,6 +7,9 @@ import pytest
 
 from muros.rclc import Context, Executor, Node
 from muros.rclc.graph import CLIENT, PUBLISHER, SERVER, SUBSCRIPTION
+from muros.space import open_space
+from tests.client.world import World
+from tests.rclc.test_rclc import two
 from tests.rclc_space.ways import PATIENCE, Stage
 
 from example_interfaces.srv import AddTwoInts
@@ -205,3 +208,25 @@ def test_a_reliable_message_is_confirmed(stage: Stage, beside: Beside) -> None:
     client = node.client(AddTwoInts, "add")
     client.session_timeout = PATIENCE
     stage.until(lambda: client.send(AddTwoInts.Request(), nothing))
+
+
+def test_who_waits_in_vain_for_an_agent_without_a_graph_is_told() -> None:
+    world = World()
+    alice, _ = two(world)
+    world.core.graph.made = lambda proxy: None  # type: ignore[method-assign]
+    problems: list[tuple[int, str]] = []
+    alice.context.on_problem(lambda code, text: problems.append((code, text)))
+    alice.connect()
+    assert not alice.node.graph.wait_for_node("/nobody", timeout=0.5)
+    assert not alice.node.client(AddTwoInts, "add").wait_for_service(timeout=0.5)
+    assert not alice.node.graph.known
+    assert [code for code, _ in problems] == [17], "once"
+    assert "a plain DDS-XRCE agent does not" in problems[0][1]
+
+
+def test_enclaves_are_seen() -> None:
+    space = open_space("local:")
+    context = Context(space, args=["--ros-args", "--enclave", "/lab/arm"])
+    context.node("arm")
+    assert [node.enclave for node in space.graph.nodes] == ["/lab/arm"]
+    context.close()

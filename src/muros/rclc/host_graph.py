@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 from muros.rclc import graph as topic
 from muros.rclc import handles
 from muros.rclc.executor import Handle
+from muros.rclc.host_handles import tell_problem
 from muros.rclc.host_waiting import spin_until
 
 if TYPE_CHECKING:
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
     from muros.xrce._types import Buffer
 
 __all__ = ["AgentGraph", "Endpoint", "Graph", "GraphSource", "GraphWatch"]
+
+NO_GRAPH: Final = 17
+"""The code with which ``on_problem`` is told that a wait was in vain because an agent publishes no graph."""
 
 PUBLISHER: Final = 0
 SUBSCRIPTION: Final = 1
@@ -79,6 +83,7 @@ class Graph:
         self._watches: list[GraphWatch] = []
         self._read: tuple[list[str], list[Endpoint]] = ([], [])
         self._fresh = -1
+        self._told = False
         middleware: Any = node.context.middleware
         self._source: GraphSource
         if hasattr(middleware, "graph_source"):
@@ -144,7 +149,16 @@ class Graph:
 
     def spin_until(self, condition: Callable[[], object], timeout: float | None = None) -> bool:
         """Waits until ``condition()`` is true, which is asked whenever anything has come; else as ``wait``."""
-        return spin_until(self._node.context, condition, timeout)
+        holds = spin_until(self._node.context, condition, timeout)
+        if not holds and not self.known and not self._told and self._node.context.state == "CONNECTED":
+            self._told = True
+            tell_problem(
+                self._node.context,
+                NO_GRAPH,
+                "the agent has told no graph, so nobody is seen: that of micro-ROS and that of muros do, a plain "
+                "DDS-XRCE agent does not. Or the graph is longer than the session's largest: raise it",
+            )
+        return holds
 
     def wait_for_node(self, name: str, timeout: float | None = None) -> bool:
         """Waits until there is a node of that full name, or of that name in this node's namespace."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +34,7 @@ class Parameters(parameters.Parameters):
         low_memory: bool,
         longest: int,
         kind: Callable[[str], Any] = kind,
-        clock: Callable[[], int] = time.time_ns,
+        clock: Callable[[], int] | None = None,
     ) -> None:
         super().__init__(node, max, notify, undeclared, low_memory, longest, kind, clock)
         self.given: dict[str, Any] = dict(node.overrides)

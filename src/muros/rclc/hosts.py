@@ -9,6 +9,7 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
+from time import time_ns
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from muros.client.hosts import Session
@@ -112,6 +113,7 @@ class Context(context_.Context):
         elif isinstance(way, str) or hasattr(way, "graph"):
             way = import_module("muros.space.rclc").open_way(way, domain_id)
             domain_id = way.domain
+            way.enclave = self.arguments.enclave or "/"
         super().__init__(way, None, domain_id or 0)
         self.clock = ticks
         self.services: dict[str, Service] = {}
@@ -285,8 +287,10 @@ class Node(context_.Node):
         if self._resolve("~/get_parameters") in self.context.services:
             raise RclError(f"node {self.name!r} has parameters already: keep what parameters() gave")
         from muros.rclc.host_parameters import Parameters
+        from muros.rclc.parameter_files import kind
 
-        made = self.__dict__["_parameters"] = Parameters(self, max, notify, undeclared, low_memory, longest)
+        options = (max, notify, undeclared, low_memory, longest, kind, time_ns)
+        made = self.__dict__["_parameters"] = Parameters(self, *options)
         if "_clock" in self.__dict__:
             self.clock.follow(made)
         return made

@@ -37,7 +37,9 @@ class Node:
         topic_name("", full, "", LONGEST_NAME)  # complains now about what cannot be
         self.context = context
         try:
-            self.participant = context.ground.space.participant(name, namespace=namespace, domain=domain)
+            self.participant = context.ground.space.participant(
+                name, namespace=namespace, domain=domain, enclave=context.enclave
+            )
         except _door.SpaceError as error:  # there is no network for this domain
             raise RclError(str(error)) from None
 

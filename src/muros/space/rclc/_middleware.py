@@ -62,6 +62,8 @@ class SpaceMiddleware:
         self.state = WAITING
         self.on_state: Callable[[int], object] | None = None
         self.on_problem: Callable[[int, str], object] | None = None
+        self.enclave = "/"
+        """The security enclave of its nodes, for others to see."""
         self.nodes: list[Node] = []
         self.ready: deque[Receiver] = deque()
         """What has something to hand on."""
