@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Final, TypeAlias
 
+from muros._distros import NEW_DISTROS, OLD_DISTROS
 from muros.links import BAUD_RATES
 
 DISCOVERY_PORT: Final = 7400
@@ -34,7 +35,7 @@ MIDDLEWARES: Final = {
 }
 MIDDLEWARE: Final = "dds"
 """Where the data goes unless told otherwise."""
-ROS_DISTROS: Final = ("humble", "iron", "jazzy", "kilted", "lyrical", "rolling")
+ROS_DISTROS: Final = (OLD_DISTROS[-1], *NEW_DISTROS)
 """What `--ros-distro` takes: Humble writes longer gids into the graph than those after it."""
 
 

@@ -96,8 +96,6 @@ class Representation(IntEnum):
 
 ENTITYID_UNKNOWN: Final = 0
 ENTITYID_PARTICIPANT: Final = 0x000001C1
-ENTITYID_SEDP_TOPICS_WRITER: Final = 0x000002C2
-ENTITYID_SEDP_TOPICS_READER: Final = 0x000002C7
 ENTITYID_SEDP_PUBLICATIONS_WRITER: Final = 0x000003C2
 ENTITYID_SEDP_PUBLICATIONS_READER: Final = 0x000003C7
 ENTITYID_SEDP_SUBSCRIPTIONS_WRITER: Final = 0x000004C2
@@ -306,9 +304,3 @@ class StatusInfo(IntFlag):
     DISPOSED = 1
     UNREGISTERED = 2
     FILTERED = 4
-
-
-# Parameter ids from here on are a vendor's own (9.6.2.2.1), and this bit asks readers that do not know the
-# parameter to leave the whole sample alone.
-PID_VENDOR_SPECIFIC: Final = 0x8000
-PID_MUST_UNDERSTAND: Final = 0x4000

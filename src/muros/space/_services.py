@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any, Protocol
 
@@ -192,12 +192,8 @@ class EngineRequester(_Side):
 
     def _schedule(self) -> None:
         """Have the timer run when the oldest request has waited long enough."""
-        timers = self.writer.core.timers
-        if self._timer is not None:
-            timers.cancel(self._timer)
-            self._timer = None
-        if self._waiting:
-            self._timer = timers.at(self._waiting[0][0], self._give_up)
+        until = self._waiting[0][0] if self._waiting else None
+        self._timer = self.writer.core.timers.move(self._timer, until, self._give_up)
 
     def _give_up(self) -> None:
         core, waiting, n = self.writer.core, self._waiting, 0
@@ -254,3 +250,9 @@ class EngineReplier(_Side):
         core, who, name = self.writer.core, self.writer.owner, self.service.name
         core.count("reply-unmatched", who, name, partial(_reports.reply_unmatched, core, who, name))
         core.drain()
+
+
+def both_sides(one: Iterable[bytes], other: Iterable[bytes]) -> int:
+    """How many of these and of those endpoints (gids) the same participants have: so many are servers, or clients."""
+    left, right = Counter(gid[:12] for gid in one), Counter(gid[:12] for gid in other)
+    return sum(min(n, right[prefix]) for prefix, n in left.items())

@@ -55,6 +55,12 @@ class Timers:
             self._changed(when - self._skew)
         return timer
 
+    def move(self, timer: Timer | None, when: int | None, callback: Callable[[], None]) -> Timer | None:
+        """Cancel `timer`, if there is one, and call `callback` at `when` instead, if that is not None."""
+        if timer is not None:
+            self.cancel(timer)
+        return None if when is None else self.at(when, callback)
+
     def cancel(self, timer: Timer) -> None:
         """It will not run. Cancelling twice, or what has run, is allowed."""
         if timer.callback is None:

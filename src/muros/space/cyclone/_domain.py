@@ -16,6 +16,7 @@ from functools import partial
 from itertools import count
 from typing import TYPE_CHECKING, Any, Final
 
+from muros._distros import OLD_DISTROS
 from muros.rtps import user_values, vendor_name
 from muros.rtps._constants import VENDOR_CYCLONE, VENDOR_EPROSIMA
 from muros.space import _reports
@@ -45,7 +46,6 @@ from muros.space.dds._discovery_info import (
     GID_SIZE_OLD,
     INFO_QOS,
     INFO_TOPIC,
-    OLD_DISTROS,
     DiscoveryInfo,
     InvalidDiscoveryInfo,
     NodeEntities,

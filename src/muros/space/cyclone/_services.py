@@ -6,8 +6,7 @@ servers cannot be asked: they are recognised by their vendor, left alone as far 
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 from muros.rtps import vendor_name
@@ -15,7 +14,7 @@ from muros.rtps._constants import VENDOR_EPROSIMA
 from muros.space import _reports
 from muros.space._door import ClosedError
 from muros.space._qos import Qos
-from muros.space._services import EngineReplier, EngineRequester
+from muros.space._services import EngineReplier, EngineRequester, both_sides
 from muros.space._values import IDENTITY_SIZE, Sample, Service, Topic, identity_of, split_identity
 from muros.space.cyclone._endpoints import CycloneReader, CycloneWriter
 from muros.space.dds._dialects import HEADER_SIZE, client_id, header, split_header
@@ -51,7 +50,7 @@ class CycloneRequester(EngineRequester):
     @property
     def servers(self) -> int:
         """Servers present that can be spoken with."""
-        return _pairs(self.writer.matched, self.reader.matched)
+        return both_sides(_heard(self.writer.matched), self.reader.matched)
 
     def sample(self, data: bytes, source_time: int | None, representation: int) -> Sample:
         """A request, not sent yet."""
@@ -110,7 +109,7 @@ class CycloneReplier(EngineReplier):
     @property
     def clients(self) -> int:
         """Clients present."""
-        return _pairs(self.reader.matched, self.writer.matched)
+        return both_sides(_heard(self.reader.matched), self.writer.matched)
 
     def deliver(self, identity: bytes, data: bytes, source_time: int | None, representation: int) -> bool:
         """Give a reply to its client."""
@@ -233,10 +232,9 @@ class _RequestReader(CycloneReader):
         self._replier.left(gid)
 
 
-def _pairs(one: Iterable[bytes], other: Iterable[bytes]) -> int:
-    """How many of one kind and the other there are in the same participants, of those that can be spoken with."""
-    left, right = Counter(gid[:12] for gid in one if gid[:2] != DEAF), Counter(gid[:12] for gid in other)
-    return sum(min(n, right[prefix]) for prefix, n in left.items())
+def _heard(gids: Iterable[bytes]) -> Iterator[bytes]:
+    """Those that can be spoken with."""
+    return (gid for gid in gids if gid[:2] != DEAF)
 
 
 def _cannot(writer: CycloneWriter, service: str, what: str) -> None:

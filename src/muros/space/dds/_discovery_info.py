@@ -19,8 +19,6 @@ __all__ = [
     "GID_SIZE_OLD",
     "INFO_QOS",
     "INFO_TOPIC",
-    "NEW_DISTROS",
-    "OLD_DISTROS",
     "DiscoveryInfo",
     "InvalidDiscoveryInfo",
     "NodeEntities",
@@ -34,12 +32,6 @@ INFO_QOS: Final = Qos(durability=Durability.TRANSIENT_LOCAL)
 
 GID_SIZE_OLD: Final = 24
 """Bytes of a gid up to ROS 2 Humble; the first 16 are the GUID, the others 0."""
-
-OLD_DISTROS: Final = ("foxy", "galactic", "humble")
-"""Distributions of ROS 2 that write gids of 24 bytes."""
-
-NEW_DISTROS: Final = ("iron", "jazzy", "kilted", "lyrical", "rolling")
-"""Those that write 16."""
 
 MAX_BYTES: Final = 4 << 20
 """Bytes read of one sample; what is larger is refused."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
+from muros._distros import OLD_DISTROS
 from muros.rtps import LocalReader, ReaderSettings, Received, WriterSettings
 from muros.space._graph import Appeared, Vanished
 from muros.space._participant import READER_KIND, WRITER_KIND
@@ -17,7 +18,6 @@ from muros.space.dds._discovery_info import (
     GID_SIZE_OLD,
     INFO_QOS,
     INFO_TOPIC,
-    OLD_DISTROS,
     DiscoveryInfo,
     InvalidDiscoveryInfo,
     told_by,

@@ -10,15 +10,15 @@ of replies is not known yet (discovery has told one side before the other) waits
 
 from __future__ import annotations
 
-from collections import Counter, deque
-from collections.abc import Callable, Iterable
+from collections import deque
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from muros.rtps import Received, guid_of
 from muros.space import _reports
 from muros.space._door import ClosedError
 from muros.space._qos import Qos
-from muros.space._services import EngineReplier, EngineRequester
+from muros.space._services import EngineReplier, EngineRequester, both_sides
 from muros.space._timers import Timer
 from muros.space._values import (
     GID_SIZE,
@@ -145,7 +145,7 @@ class DdsRequester(EngineRequester):
 
     def met(self) -> None:
         """Somebody matches the writer or the reader: there may be a server now."""
-        before, servers = self._servers, _pairs(self.writer.ready, self.reader.matched)
+        before, servers = self._servers, both_sides(self.writer.ready, self.reader.matched)
         self._servers = servers
         if servers > 1 >= before:
             writer = self.writer
@@ -229,7 +229,7 @@ class DdsReplier(EngineReplier):
     @property
     def clients(self) -> int:
         """Clients present: who writes requests and reads replies."""
-        return _pairs(self.reader.matched, self.writer.matched)
+        return both_sides(self.reader.matched, self.writer.matched)
 
     def deliver(self, identity: bytes, data: bytes, source_time: int | None, representation: int) -> bool:
         """Send a reply to its client, or keep it until the client's reader is known."""
@@ -334,12 +334,8 @@ class DdsReplier(EngineReplier):
         self._schedule()
 
     def _schedule(self) -> None:
-        timers = self.writer.core.timers
-        if self._timer is not None:
-            timers.cancel(self._timer)
-            self._timer = None
-        if self._late:
-            self._timer = timers.at(self._late[0].until, self._give_up)
+        until = self._late[0].until if self._late else None
+        self._timer = self.writer.core.timers.move(self._timer, until, self._give_up)
 
     def _give_up(self) -> None:
         self._timer = None
@@ -403,24 +399,18 @@ class _RequestWriter(DdsWriter):
         """Let go of everything held."""
         super().detach()
         self._silent.clear()
-        if self._timer is not None:
-            self.core.timers.cancel(self._timer)
-            self._timer = None
+        self._timer = self.core.timers.move(self._timer, None, self._listen)
 
     def _listen(self) -> None:
         """See who has spoken since, or been silent for long enough."""
         timers = self.core.timers
-        if self._timer is not None:
-            timers.cancel(self._timer)
-            self._timer = None
         now = timers.now()
         heard = {guid_of(*proxy.key) for proxy in self.out.core.readers if proxy.count is not None}
         for remote, until in list(self._silent.items()):
             if remote in heard or until <= now:
                 del self._silent[remote]
                 self._ready.add(remote)
-        if self._silent:
-            self._timer = timers.at(now + LISTEN_EVERY, self._listen)
+        self._timer = timers.move(self._timer, now + LISTEN_EVERY if self._silent else None, self._listen)
         self._requester.met()
 
 
@@ -510,9 +500,3 @@ class _ReplyWriter(DdsWriter):
     def disconnected(self, remote: bytes) -> None:
         """A reader of replies matches no more."""
         self._replier.reader_left(remote)
-
-
-def _pairs(one: Iterable[bytes], other: Iterable[bytes]) -> int:
-    """How many of one kind and the other there are in the same participants."""
-    left, right = Counter(gid[:12] for gid in one), Counter(gid[:12] for gid in other)
-    return sum(min(n, right[prefix]) for prefix, n in left.items())

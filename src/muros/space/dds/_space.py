@@ -10,13 +10,13 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 from muros import __version__
+from muros._distros import NEW_DISTROS, OLD_DISTROS
 from muros.findings import Findings
 from muros.rtps import MAX_DOMAIN, DomainReport
 from muros.space._core import Limits
 from muros.space._door import SpaceError
 from muros.space._participant import prefix_of, prefixes
 from muros.space._space import EngineSpace
-from muros.space.dds._discovery_info import NEW_DISTROS, OLD_DISTROS
 from muros.space.dds._domain import Carrier, DdsDomain
 from muros.space.dds._participant import DdsParticipant
 from muros.space.dds._remote import VERSION

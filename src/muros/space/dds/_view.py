@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
-from muros.space._core import Core
 from muros.space._graph import (
     Endpoint,
-    GraphEvent,
     Incompatible,
     ParticipantInfo,
     Role,
@@ -16,19 +14,15 @@ from muros.space._graph import (
 )
 from muros.space._qos import mismatches
 from muros.space._reports import types_differ
+from muros.space._view import EngineGraph
 from muros.space.dds._discovery_info import INFO_TOPIC
 from muros.space.dds._domain import DdsDomain
 
 __all__ = ["DdsGraph"]
 
 
-class DdsGraph:
+class DdsGraph(EngineGraph[DdsDomain]):
     """See `muros.space.Graph`."""
-
-    def __init__(self, core: Core, domains: dict[int, DdsDomain], domain: int) -> None:
-        self._core = core
-        self._domains = domains
-        self._domain = domain
 
     @property
     def participants(self) -> tuple[ParticipantInfo, ...]:
@@ -39,11 +33,6 @@ class DdsGraph:
             for remote in domain.remotes.values():
                 found += remote.infos
         return tuple(found)
-
-    @property
-    def nodes(self) -> tuple[ParticipantInfo, ...]:
-        """The participants that have a node name."""
-        return tuple(info for info in self.participants if info.name)
 
     @property
     def writers(self) -> tuple[Endpoint, ...]:
@@ -100,19 +89,6 @@ class DdsGraph:
             if (found := domain.endpoint_shown(gid)) is not None:
                 return found
         return None
-
-    def watch(self, callback: Callable[[GraphEvent], object]) -> Callable[[], None]:
-        """Call `callback` with every change. Returns a function that ends it."""
-        key = object()
-        self._core.watchers[key] = callback
-
-        def cancel() -> None:
-            self._core.watchers.pop(key, None)
-
-        return cancel
-
-    def _home(self, domain: int | None) -> DdsDomain | None:
-        return self._domains.get(self._domain if domain is None else domain)
 
 
 def _all(domain: DdsDomain, topic: str | None = None) -> Iterator[Endpoint]:

@@ -2,42 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 
-from muros.space._core import Core
 from muros.space._endpoint import EngineEndpoint
 from muros.space._graph import (
     Endpoint,
-    GraphEvent,
     Incompatible,
     ParticipantInfo,
     Role,
     ServiceInfo,
     TopicInfo,
 )
+from muros.space._view import EngineGraph
 from muros.space.local._matching import TopicRecord, reasons_against
 from muros.space.local._participant import Domain
 
 __all__ = ["LocalGraph"]
 
 
-class LocalGraph:
+class LocalGraph(EngineGraph[Domain]):
     """See `muros.space.Graph`."""
-
-    def __init__(self, core: Core, domains: dict[int, Domain], domain: int) -> None:
-        self._core = core
-        self._domains = domains
-        self._domain = domain
 
     @property
     def participants(self) -> tuple[ParticipantInfo, ...]:
         """All participants."""
         return tuple(p.info() for domain in self._domains.values() for p in domain.participants.values())
-
-    @property
-    def nodes(self) -> tuple[ParticipantInfo, ...]:
-        """The participants that have a node name."""
-        return tuple(info for info in self.participants if info.name)
 
     @property
     def writers(self) -> tuple[Endpoint, ...]:
@@ -84,19 +73,6 @@ class LocalGraph:
             if (endpoint := domain.endpoints.get(gid)) is not None:
                 return endpoint.info()
         return None
-
-    def watch(self, callback: Callable[[GraphEvent], object]) -> Callable[[], None]:
-        """Call `callback` with every change. Returns a function that ends it."""
-        key = object()
-        self._core.watchers[key] = callback
-
-        def cancel() -> None:
-            self._core.watchers.pop(key, None)
-
-        return cancel
-
-    def _home(self, domain: int | None) -> Domain | None:
-        return self._domains.get(self._domain if domain is None else domain)
 
     def _endpoints(self) -> Iterator[EngineEndpoint]:
         for domain in self._domains.values():
