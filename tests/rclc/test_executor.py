@@ -1,7 +1,9 @@
 """The executor: what it runs, when, and what it refuses. Cases are named as in the C library, in virtual time."""
 
+import json
 from collections.abc import Callable, Iterator
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -654,3 +656,31 @@ def test_timers_of_hosts_are_exact(local: InSpace) -> None:
     assert calls[:3] == [2.5, 5.0, 7.5]
     assert timer.exchange_period(0.5) == 1 / 400
     assert timer.period == 500
+
+
+# Handles, and what errors are called
+
+
+def test_h1_to_h5_handles(local: InSpace) -> None:
+    """What a handle is when it is made, when an executor has it, and when it is gone."""
+    from muros.rclc.executor import Handle
+
+    bare = Handle(local.context)
+    assert (bare.entity, bare.handles, bare.eager) == (None, None, True)
+    assert bare.left(0) >= 1_000_000, "it is never ready by itself"
+    assert local.context.handles == [bare]
+    bare.destroy()
+    assert local.context.handles == []
+    subscription = local.context.node("n").subscription(Int32, "topic", print)
+    executor = local.executor()
+    executor.add(subscription)
+    assert subscription.handles is executor.handles
+    assert subscription.entity is not None
+    executor.remove(subscription)
+    assert executor.handles == []
+
+
+def test_errors_bear_the_codes_of_the_c_library() -> None:
+    codes = json.loads((Path(__file__).parents[1] / "vectors/rmw/return_codes.json").read_text())["rcl"]
+    assert HandleError.code == codes["INVALID_ARGUMENT"]
+    assert CapacityError.code == codes["ERROR"]
