@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from muros.rclc import Context, Executor, Node
-from muros.rclc.graph import CLIENT, PUBLISHER, SERVER, SUBSCRIPTION
+from muros.rclc.host_graph import CLIENT, PUBLISHER, SERVER, SUBSCRIPTION
 from muros.space import open_space
 from tests.client.world import World
 from tests.rclc.test_rclc import two
@@ -106,8 +106,10 @@ def test_an_executor_is_told_of_changes(stage: Stage) -> None:
     company = Company(stage).seen()
     told: list[list[str]] = []
     watch = company.looking.graph.on_change(lambda graph: told.append(graph.nodes()))
+    stage.until(lambda: told)
+    assert told[0] == company.looking.graph.nodes(), "what is there already is told at once"
     late = stage.node("late")
-    stage.until(lambda: told and "/late" in told[-1])
+    stage.until(lambda: "/late" in told[-1])
     late.destroy()
     stage.until(lambda: "/late" not in told[-1])
     watch.destroy()

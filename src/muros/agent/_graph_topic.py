@@ -89,13 +89,15 @@ class _Domain:
 
     def _graph(self) -> bytes:
         """The graph as it is now, serialised."""
+        from muros.rclc.host_graph import KINDS
         from muros.space.rclc._graph import endpoints_of, nodes_of
 
         graph = self._core.space.graph
         entities: dict[str, dict[tuple[int, str], set[str]]] = {}
         for end in endpoints_of(graph, self._domain):
             if max(len(end.name), len(end.type)) <= LONGEST_NAME:
-                entities.setdefault(end.node, {}).setdefault((end.kind, end.name), set()).add(end.type)
+                key = (KINDS.index(end.kind), end.name)
+                entities.setdefault(end.node, {}).setdefault(key, set()).add(end.type)
         made: Any = interfaces.message("micro_ros_msgs/msg/Graph")()
         make_node = interfaces.message("micro_ros_msgs/msg/Node")
         make_entity = interfaces.message("micro_ros_msgs/msg/Entity")

@@ -32,17 +32,18 @@ __all__ = ["AgentGraph", "Endpoint", "Graph", "GraphSource", "GraphWatch"]
 NO_GRAPH: Final = 17
 """The code with which ``on_problem`` is told that a wait was in vain because an agent publishes no graph."""
 
-PUBLISHER: Final = 0
-SUBSCRIPTION: Final = 1
-SERVER: Final = 2
-CLIENT: Final = 3
+KINDS: Final = ("publisher", "subscription", "server", "client")
+"""What an endpoint is, in the order of the numbers of micro_ros_msgs/msg/Entity."""
+
+PUBLISHER, SUBSCRIPTION, SERVER, CLIENT = KINDS
 
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """Something that a node made. ``kind`` is PUBLISHER, SUBSCRIPTION, SERVER or CLIENT."""
+    """Something that a node made."""
 
-    kind: int
+    kind: str
+    """publisher, subscription, server or client."""
     name: str
     """Full name of the topic or service."""
     type: str
@@ -178,7 +179,7 @@ class Graph:
         return self.wait(lambda graph: graph.servers(name), timeout)
 
     def on_change(self, callback: Callable[[Graph], object]) -> GraphWatch:
-        """Has an executor call ``callback(graph)`` after changes, several of them at once perhaps.
+        """Has an executor call ``callback(graph)`` now and after changes, several of them at once perhaps.
 
         The handle that it returns ends that with ``destroy()``.
         """
@@ -207,7 +208,7 @@ class Graph:
     def _nodes(self) -> list[str]:
         return self._look()[0]
 
-    def _of(self, kind: int, name: str | None = None, node: str | None = None) -> list[Endpoint]:
+    def _of(self, kind: str, name: str | None = None, node: str | None = None) -> list[Endpoint]:
         full = node and self._node_name(node)
         return [
             endpoint
@@ -222,12 +223,12 @@ class Graph:
 
 
 class GraphWatch(Handle):
-    """Made by ``Graph.on_change``: an executor calls ``callback(graph)`` when the graph has changed."""
+    """Made by ``Graph.on_change``."""
 
     def __init__(self, context: Context, graph: Graph, callback: Callable[[Graph], object]) -> None:
         super().__init__(context)
         self.callback = callback
-        self.changed = False
+        self.changed = graph.known
         self._graph = graph
 
     def ready(self, now: int) -> bool:
@@ -273,8 +274,8 @@ class AgentGraph:
         def visit(node: str, kind: int, name: str, types: list[str]) -> None:
             if kind == topic.NODE:
                 nodes.append(node)
-            else:
-                endpoints.extend(Endpoint(kind, name, one, node) for one in types or [""])
+            elif kind < len(KINDS):
+                endpoints.extend(Endpoint(KINDS[kind], name, one, node) for one in types or [""])
 
         try:
             topic.read_untrusted(buf, off, n, visit)

@@ -74,7 +74,7 @@ def _in_domain(ends: Iterable[_graph.Endpoint], domain: int) -> Iterable[_graph.
     return (end for end in ends if end.participant.domain == domain)
 
 
-def _endpoint(kind: int, name: str, type_name: str, end: _graph.Endpoint) -> Endpoint:
+def _endpoint(kind: str, name: str, type_name: str, end: _graph.Endpoint) -> Endpoint:
     node = end.participant.full_name if end.participant.name else ""
     return Endpoint(kind, name, type_name, node, end.gid, end.qos, end.type_hash)
 
