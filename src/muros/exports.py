@@ -22,6 +22,7 @@ rclc.action_server ActionServer
 rclc.goal_error GoalError
 rclc.client Client
 rclc.context Context Node
+rclc.diagnostics DiagnosticUpdater
 rclc.errors CapacityError InvalidNameError RclError
 rclc.executor Executor
 rclc.guard GuardCondition

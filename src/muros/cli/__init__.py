@@ -27,6 +27,7 @@ COMMANDS = {
     "graph": ("muros.cli.graph", "show who talks to whom, as text or as a picture"),
     "action": ("muros.cli.action", "list actions of the ROS 2 graph and send goals to them"),
     "service": ("muros.cli.service", "list and call services of the ROS 2 graph"),
+    "diagnostics": ("muros.cli.diagnostics", "show what boards say about their health to tools of ROS 2"),
     "lifecycle": ("muros.cli.lifecycle", "show and move managed nodes of the ROS 2 graph"),
 }
 """Sub-commands: the module, which has `run(argv) -> int` or `register(subparsers)` for argparse, and its help."""
