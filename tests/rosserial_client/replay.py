@@ -72,7 +72,9 @@ class Player:
         self.ignored = ignored
         """Numbers of frames that are neither played nor expected."""
         self.infos: dict[int, tuple[int, TopicInfo]] = {}
-        for frame in record["frames"]:
+        for number, frame in enumerate(record["frames"]):
+            if number in ignored:
+                continue
             topic_id, payload = opened(bytes.fromhex(frame["hex"])) if frame["kind"] == "frame" else (99, b"")
             if frame["dir"] == "b2h" and topic_id <= 5:
                 info = topic_info_untrusted(payload, 0, len(payload))
