@@ -14,9 +14,10 @@ from muros.rclc import action_server as server_
 from muros.rclc import actions, goals
 from muros.rclc.errors import RclError
 from muros.rclc.host_checks import WrongTypeError, WrongValueError, be_callable, fits, no_class, other
+from muros.rclc.sharing import call_elsewhere, hand_over
 
 if TYPE_CHECKING:
-    from muros.rclc.hosts import Node
+    from muros.rclc.hosts import Context, Node
 
 Callback = Callable[..., object] | None
 
@@ -56,6 +57,8 @@ class ActionServer(server_.ActionServer):
 class ActionClient(client_.ActionClient):
     """Made by ``Node.action_client``; see ``muros.rclc.action_client.ActionClient``."""
 
+    context: Context
+
     def send_goal(
         self,
         goal: Any,
@@ -86,12 +89,29 @@ class ActionClient(client_.ActionClient):
         """
         if not fits(goal, self.kind.Goal):
             raise other(goal, self.kind.Goal, "call")
-        if self.parts and self.parts[0].name in self.parts[0].context.services:
+        service = self.context.services.get(self.parts[0].name) if self.parts else None
+        if service is not None and hand_over(service) is None:
             raise RclError(
                 f"action {self.name!r} is served by this very context, which does not run during call(). "
                 "Use send_goal(goal, ...) and an executor."
             )
-        return super().call(goal, timeout, on_feedback)
+        if hand_over(self) is None:
+            return super().call(goal, timeout, on_feedback)
+        made: list[client_.SentGoal] = []
+
+        def begin(done: Callable[[], object]) -> None:
+            def answered(sent: client_.SentGoal, accepted: bool | None) -> None:
+                if not accepted:
+                    done()
+
+            sent = self.send_goal(goal, answered, on_feedback, lambda sent, result: done(), timeout)
+            if sent is None:
+                done()
+            else:
+                made.append(sent)
+
+        call_elsewhere(self, self.parts[0].entity.room, begin, timeout)
+        return made[0] if made and made[0].accepted is not None else None
 
 
 def make_server(

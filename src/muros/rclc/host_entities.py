@@ -13,6 +13,7 @@ from muros.rclc.errors import RclError
 from muros.rclc.host_checks import WrongTypeError, be_callable, called, fits, other
 from muros.rclc.host_waiting import wait_confirmed
 from muros.rclc.outlet import body, outlet
+from muros.rclc.sharing import call_elsewhere, hand_over
 
 if TYPE_CHECKING:
     from muros.rclc._types import Publisher as AnyPublisher
@@ -35,7 +36,7 @@ class Publisher:
         """Sends a message; False when it was not taken. Raises TypeError for one of another type.
 
         It waits for nothing, unless there is a ``timeout`` (None: ``session_timeout``): then so many seconds at most
-        until a reliable message is confirmed, by the agent or straight in a space by every reader; False when it is not.
+        until a reliable message is confirmed: by the agent, or straight in a space by every reader. False if it is not.
         """
         if not isinstance(message, self._kind) and not fits(message, self._kind):
             raise other(message, self._kind, "publish")
@@ -61,6 +62,8 @@ class Publisher:
 
     def destroy(self) -> None:
         """Takes it away."""
+        if self._writer in self._node.entities:
+            self._node.entities.remove(self._writer)
         self._writer.destroy()
 
     def __getattr__(self, name: str) -> Any:
@@ -85,6 +88,11 @@ class Service(service_.Service):
         if outlet.task is not None:
             answer = Raw(body(response))
             outlet.task.hold(self, lambda: service_.Service.reply(self, identity, answer))
+            return
+        hand = hand_over(self)
+        if hand is not None:
+            answer = Raw(body(response))
+            hand(lambda: service_.Service.reply(self, identity, answer))
             return
         super().reply(identity, response)
         if self.session_timeout:
@@ -131,13 +139,18 @@ class Client(client_.Client):
             asked = Raw(body(request))
             outlet.task.hold(self, lambda: self._ask(asked, on_reply, timeout))
             return True
+        hand = hand_over(self)
+        if hand is not None:
+            asked = Raw(body(request))
+            hand(lambda: self._ask(asked, on_reply, timeout))
+            return True
         taken = super().send(request, on_reply, timeout)
         if not taken or not self.session_timeout:
             return taken
         return wait_confirmed(self.context, self.entity, self.session_timeout)
 
     def _ask(self, request: Raw, on_reply: Callable[[Any], object], timeout: float) -> bool:
-        """Sends a request that LET has held back; one that is not taken then has no answer."""
+        """Sends a request that was held back, or comes from another thread; one not taken then has no answer."""
         taken = super().send(request, on_reply, timeout)
         if not taken:
             self._waiting.append((on_reply, None))
@@ -149,9 +162,25 @@ class Client(client_.Client):
         Not for callbacks, nor for a service of the same context: those run in an executor, where ``send`` belongs.
         Raises RclError for the latter.
         """
-        if self.name in self.context.services:
+        service = self.context.services.get(self.name)
+        if service is not None and hand_over(service) is None:
             raise RclError(
                 f"service {self.name!r} is served by this very context, which does not run during call(). "
                 "Use send(request, on_reply) and an executor."
             )
-        return handles.call(self, request, timeout)
+        if hand_over(self) is None:
+            return handles.call(self, request, timeout)
+        if not fits(request, self._kind.Request):
+            raise other(request, self._kind.Request, "call")
+        answers: list[Any] = []
+
+        def begin(done: Callable[[], object]) -> None:
+            def take(reply: Any) -> None:
+                answers.append(reply)
+                done()
+
+            self._ask(asked, take, timeout)
+
+        asked = Raw(body(request))
+        call_elsewhere(self, self.entity.room, begin, timeout)
+        return answers[0] if answers else None
