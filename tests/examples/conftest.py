@@ -14,7 +14,7 @@ from tests.examples.stage import TYPES, Stage
 def board(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The message classes that a board has."""
     folder = tmp_path_factory.mktemp("board")
-    boards.generate(list(TYPES), folder)
+    boards.generate(list(TYPES), folder, shapes=True)
     return folder
 
 

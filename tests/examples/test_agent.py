@@ -36,7 +36,7 @@ def test_epoch(stage: Stage, on: str) -> None:
     program = stage.start("epoch_sync", stage.agent(), on=on)
     stage.until(lambda: program.lines)
     match = re.fullmatch(r"(\d+-\d\d-\d\d), within (\d+) us", program.lines[0])
-    assert match
+    assert match, program.lines
     assert today <= datetime.fromisoformat(match[1]).date() <= datetime.now(UTC).date()
     assert int(match[2]) < 1_000_000
 

@@ -128,6 +128,18 @@ def test_the_shortest_program(stage: Stage, on: str) -> None:
     stage.until(lambda: program.lines[:2] == ["hello", "hello"])
 
 
+@pytest.mark.parametrize(("place", "on"), [("local:", "python"), ("agent", "micropython")])
+def test_bounds_of_what_messages_take(stage: Stage, place: str, on: str) -> None:
+    if on == "micropython":
+        require("unix")
+    program = stage.start("static_types", stage.agent() if place == "agent" else place, on=on)
+    stage.until(lambda: len(program.lines) >= 4)
+    heard = "heard ['shoulder', 'elbow']"
+    refused = "72 B of sensor_msgs/msg/JointState dropped: name is longer than the rules allow"
+    assert {heard, refused} == set(program.lines)
+    assert program.lines[:2] == [heard, refused]
+
+
 def test_without_a_way_it_says_how_it_is_used(stage: Stage) -> None:
     program = stage.start("hello_world")
     assert program.process.wait(30) == 2
