@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
@@ -110,8 +111,9 @@ def test_leds_are_switched_and_topics_are_heard(distro: str, peer: Fetch, rig: R
         assert board.leds == [1, 2, 4, 8, 0]
         heard = rig.ask(ros, "subscription", node=node, topic="/chatter", type="std_msgs/msg/String", qos=100)
         imus = rig.ask(ros, "subscription", node=node, topic="/imu", type="sensor_msgs/msg/Imu")
-        rig.ask(ros, "matched", thing=heard)
-        rig.ask(ros, "matched", thing=imus)
+        for name in ("chatter", "imu"):
+            made: Any = board.server.core.boards[0].endpoints[0, name]
+            rig.until(partial(lambda each: each.publisher._writer.matched, made))
 
         def talk() -> None:
             for i in range(50):
@@ -183,7 +185,8 @@ def test_logs_are_heard(peer: Fetch, rig: Rig, domain: Domain) -> None:
     node = ros.do("node", name="program", domain=domain)
     with opencr(rig, domain) as board:
         logs = rig.ask(ros, "subscription", node=node, topic="/rosout", type="rcl_interfaces/msg/Log")
-        rig.ask(ros, "matched", thing=logs, count=2)  # rclpy's own node, and the board
+        made: Any = board.server.core.boards[0].node
+        rig.until(lambda: made._rosout.matched)
         board.do(rig, lambda: board.node.logwarn("battery is low"))
         for _ in range(20):
             (log,) = rig.ask(ros, "take", subscription=logs)
