@@ -1,10 +1,11 @@
 """Entities over every way, by the ids of the acceptance cases: E1 to E18 of the C library, R1 to R23 of its middleware.
 
 What has no case here has one elsewhere: R6 (topics are part of writers and readers), R7 and R8 in
-`tests/client/test_streaming.py`, R20 to R22 in `tests/client`, R24 in the memory tests. What is null in C is None here.
+`tests/client/test_streaming.py`, R24 in the memory tests. What is null in C is None here.
 """
 
 import json
+import time
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
@@ -15,9 +16,11 @@ from typing import Any
 import pytest
 
 import muros.rclc
-from muros.client import Qos, Udp
+from muros.client import Qos, TimeSync, Udp, discover, ping
+from muros.links import DiscoveryLink, UdpLink
 from muros.rclc import Context, Executor, GuardCondition, InvalidNameError, Node
-from tests.rclc_space.ways import Stage
+from tests.client.agent_thread import RunningAgent
+from tests.rclc_space.ways import PATIENCE, Stage
 
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32, String
@@ -390,6 +393,31 @@ def test_r19_init_and_shutdown_again(stage: Stage) -> None:
         assert context.wait_connected(10.0)
         context.close()
     assert not context.wait_connected(0.01)
+
+
+def test_r20_to_r22_an_agent_is_found_asked_and_believed() -> None:
+    data, door = UdpLink(0, "127.0.0.1"), DiscoveryLink(0)
+    agent = RunningAgent(data, door)
+    try:
+        ((host, port),) = discover(["127.0.0.1"], door.port, attempts=5)
+        transport = Udp(host, port)
+        assert ping(transport, 5), "before there is a session"
+        transport.close()
+        context = Context(Udp(host, port))
+        context.node("one")
+        assert context.wait_connected(PATIENCE)
+        assert context.ping(PATIENCE), "and within it"
+        sync = TimeSync(context.middleware)
+        end = time.monotonic() + PATIENCE
+        while not sync.synchronized():
+            assert time.monotonic() < end
+            sync.request()
+            context.middleware.wait(100)
+            context.middleware.spin_once()
+        assert abs(sync.time()[0] - time.time()) <= 5
+        context.close()
+    finally:
+        agent.stop()
 
 
 def test_r23_guard_condition(stage: Stage) -> None:
