@@ -11,6 +11,7 @@ follow are its key performance indicators.
 single       one executor, in the order of making: sensors, then the others by kind
 prioritised  one executor, the hot path added first: the order of adding is the priority
 let          one executor in logical execution time: inputs at each period's start, outputs at its end
+groups       three threads: the hot path real-time critical, the planner soft real-time, the others best effort
 """
 
 import argparse
@@ -133,10 +134,30 @@ def let(context: Context, system: System) -> Callable[[float], object]:
     return _until(executor, context)
 
 
+def groups(context: Context, system: System) -> Callable[[float], object]:
+    """A thread for each real-time class: the hot path, the planner, the others."""
+    from muros.rclc.groups import BEST_EFFORT, REAL_TIME_CRITICAL, SOFT_REAL_TIME, CallbackGroup, Threads
+
+    others = [name for name in node_names() if name not in HOT_PATH and name != PLANNER]
+    threads = Threads(context)
+    for name, urgency, names in (
+        ("hot path", REAL_TIME_CRITICAL, HOT_PATH),
+        ("planner", SOFT_REAL_TIME, (PLANNER,)),
+        ("others", BEST_EFFORT, others),
+    ):
+        group = CallbackGroup(name, urgency)
+        for handle in system.handles(names):
+            group.add(handle)
+        threads.assign(group)
+
+    return lambda end: threads.run(end - time.monotonic())
+
+
 EXECUTORS: dict[str, Callable[[Context, System], Callable[[float], object]]] = {
     "single": single,
     "prioritised": prioritised,
     "let": let,
+    "groups": groups,
 }
 
 

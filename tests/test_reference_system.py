@@ -249,7 +249,7 @@ def test_the_benchmark_reports_and_draws(tmp_path: Path) -> None:
     )
     assert (done.returncode, done.stderr) == (0, "")
     rows = json.loads((tmp_path / "rows.json").read_text())
-    assert {"single", "prioritised"} <= set(rows)
+    assert list(rows) == ["single", "prioritised", "let", "groups"]
     for name, row in rows.items():
         assert f"\n{name}\n" in done.stdout
         assert any(line.startswith("hot path latency: ") and "ms [min=" in line for line in row["lines"])
