@@ -5,13 +5,13 @@ from collections.abc import Callable
 import pytest
 
 from muros.space import Durability, Qos, Reliability, Topic
-from tests.dds.bodies import array, basic, basic_value, pattern, shown, string, text_of
+from tests.dds.bodies import array, basic, basic_value, pattern, shown
 from tests.dds.domains import Domain
+from tests.dds.matrix import topics_both_ways
 from tests.dds.peers import Peer, require
 from tests.dds.rig import ARRAY, BASIC_TYPES, STRING, Rig
 
 Fetch = Callable[[str], Peer]
-TWENTY = [f"n{n}" for n in range(20)]
 TYPE = "test_msgs/srv/BasicTypes"
 
 
@@ -25,37 +25,8 @@ def test_topics_over_the_qos_matrix(name: str, peer: Fetch, rig: Rig, domain: Do
     other = peer(name)
     node = other.do("node", name="other", domain=domain)
     ours = rig.space(domain, "cyclonedds").participant("ours")
-    for reliability in (Reliability.RELIABLE, Reliability.BEST_EFFORT):
-        for durability in (Durability.VOLATILE, Durability.TRANSIENT_LOCAL):
-            case = f"{reliability.name}_{durability.name}".lower()
-            qos = Qos(reliability, durability, depth=20)
-            said = {
-                "reliability": reliability.name.lower(),
-                "durability": durability.name.lower(),
-                "depth": 20,
-            }
-            text = {"node": node, "type": "std_msgs/msg/String", "qos": said}
-            writer = ours.writer(Topic(f"rt/out_{case}", STRING), qos)
-            reader = ours.reader(Topic(f"rt/in_{case}", STRING), qos)
-            subscription = rig.ask(other, "subscription", topic=f"/out_{case}", **text)
-            publisher = rig.ask(other, "publisher", topic=f"/in_{case}", **text)
-            rig.matched(writer)
-            rig.matched(reader)
-            assert rig.ask(other, "matched", thing=subscription) == 1
-            assert rig.ask(other, "matched", thing=publisher) == 1
-            for word in TWENTY:
-                assert writer.write(string(word))
-            # One by one: a volatile reader of Cyclone skips to where the first HEARTBEAT is that it sees.
-            many = {"publisher": publisher, "message": {"data": "n"}, "count": 20, "number": "data"}
-            rig.ask(other, "publish", period=0.005, **many)
-            got = rig.ask(other, "take", subscription=subscription, count=20)
-            assert [message["data"] for message in got] == TWENTY, case
-            assert [text_of(body) for body in rig.collect(reader, 20)] == TWENTY, case
-            if case == "reliable_transient_local":
-                late = rig.ask(other, "subscription", topic=f"/out_{case}", **text)
-                got = rig.ask(other, "take", subscription=late, count=20)
-                assert [message["data"] for message in got] == TWENTY, "their late joiner"
-    assert rig.told == []
+    # One by one: a volatile reader of Cyclone skips to where the first HEARTBEAT is that it sees.
+    topics_both_ways(rig, other, node, ours, period=0.005)
 
 
 def test_large_samples(peer: Fetch, rig: Rig, domain: Domain) -> None:

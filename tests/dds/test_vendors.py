@@ -4,15 +4,15 @@ from collections.abc import Callable
 
 import pytest
 
-from muros.space import Durability, Qos, Reliability, Topic
+from muros.space import Durability, Qos, Topic
 from tests.dds.bodies import array, pattern, shown, string, text_of
 from tests.dds.domains import Domain
+from tests.dds.matrix import topics_both_ways
 from tests.dds.peers import Peer, start
 from tests.dds.rig import ARRAY, STRING, Losses, Rig
 
 VENDORS = ("cyclone", "fastdds")
 Fetch = Callable[[str], Peer]
-TWENTY = [f"n{n}" for n in range(20)]
 
 
 @pytest.mark.parametrize("name", VENDORS)
@@ -20,37 +20,7 @@ def test_topics_over_the_qos_matrix(name: str, peer: Fetch, rig: Rig, domain: Do
     vendor = peer(name)
     node = vendor.do("node", name="vendor", domain=domain)
     ours = rig.space(domain).participant("ours")
-    for reliability in (Reliability.RELIABLE, Reliability.BEST_EFFORT):
-        for durability in (Durability.VOLATILE, Durability.TRANSIENT_LOCAL):
-            case = f"{reliability.name}_{durability.name}".lower()
-            qos = Qos(reliability, durability, depth=20)
-            said = {
-                "reliability": reliability.name.lower(),
-                "durability": durability.name.lower(),
-                "depth": 20,
-            }
-            text = {"node": node, "type": "std_msgs/msg/String", "qos": said}
-            writer = ours.writer(Topic(f"rt/out_{case}", STRING), qos)
-            reader = ours.reader(Topic(f"rt/in_{case}", STRING), qos)
-            subscription = rig.ask(vendor, "subscription", topic=f"/out_{case}", **text)
-            publisher = rig.ask(vendor, "publisher", topic=f"/in_{case}", **text)
-            rig.matched(writer)
-            rig.matched(reader)
-            assert rig.ask(vendor, "matched", thing=subscription) == 1
-            assert rig.ask(vendor, "matched", thing=publisher) == 1
-            for word in TWENTY:
-                writer.write(string(word))
-            rig.ask(vendor, "publish", publisher=publisher, message={"data": "n"}, count=20, number="data")
-            got = rig.ask(vendor, "take", subscription=subscription, count=20)
-            assert [message["data"] for message in got] == TWENTY, case
-            assert [text_of(body) for body in rig.collect(reader, 20)] == TWENTY, case
-            if case == "reliable_transient_local":
-                late = rig.ask(vendor, "subscription", topic=f"/out_{case}", **text)
-                got = rig.ask(vendor, "take", subscription=late, count=20)
-                assert [message["data"] for message in got] == TWENTY, "their late joiner"
-                late_reader = ours.reader(Topic(f"rt/in_{case}", STRING), qos)
-                assert [text_of(body) for body in rig.collect(late_reader, 20)] == TWENTY, "our late joiner"
-    assert rig.told == []
+    topics_both_ways(rig, vendor, node, ours)
 
 
 @pytest.mark.parametrize("loss", [0, 0.05])
