@@ -86,3 +86,13 @@ def test_beside_the_tasks_of_an_asyncio_program(stage: Stage) -> None:
     program = stage.start("asyncio_program", "local:")
     program.ends()
     assert program.lines == [f"{what} {i}" for i in (1, 2, 3) for what in ("a task counts", "heard")]
+
+
+@pytest.mark.parametrize("place", ["local:", "agent"])
+def test_a_long_callback_in_another_thread(stage: Stage, place: str) -> None:
+    program = stage.start("multithread", stage.agent() if place == "agent" else place)
+    stage.until(lambda: program.lines.count("logging ends") >= 2)
+    begin, end = program.lines.index("logging begins"), program.lines.index("logging ends")
+    assert sum(line.startswith("control") for line in program.lines[begin:end]) >= 2
+    numbers = [int(line.split()[1]) for line in program.lines if line.startswith("control")]
+    assert numbers == list(range(1, len(numbers) + 1))
