@@ -18,7 +18,7 @@ CLOCK: Any = message("rosgraph_msgs/msg/Clock")
 
 
 def test_no_program_goes_untested() -> None:
-    assert len(programs(GUIDE)) == 3
+    assert len(programs(GUIDE)) == 4
 
 
 def test_logging(bench: Bench) -> None:
@@ -50,6 +50,14 @@ def test_simulated_time(bench: Bench, number: int) -> None:
 
     bench.until(lambda: len(running.lines) >= 2, step)
     assert running.lines[0].startswith("step at (")
+    bench.says_goodbye(running)
+
+
+def test_the_time_since_1970(bench: Bench) -> None:
+    running = bench.start(GUIDE, 3)
+    bench.until(lambda: len(running.lines) >= 2)
+    assert running.lines[0] == "synchronized"
+    assert int(running.lines[1].split("it is ")[1].split(" ")[0]) > 1_700_000_000_000
     bench.says_goodbye(running)
 
 

@@ -23,6 +23,7 @@ rclc.goal_error GoalError
 rclc.client Client
 rclc.context Context Node
 rclc.diagnostics DiagnosticUpdater
+rclc.epoch Epoch
 rclc.errors CapacityError InvalidNameError RclError
 rclc.executor Executor
 rclc.guard GuardCondition

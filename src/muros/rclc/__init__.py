@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from muros.rclc.arena import Arena as Arena
     from muros.rclc.arena import Text as Text
     from muros.rclc.diagnostics import DiagnosticUpdater as DiagnosticUpdater
+    from muros.rclc.epoch import Epoch as Epoch
     from muros.rclc.errors import CapacityError as CapacityError
     from muros.rclc.errors import InvalidNameError as InvalidNameError
     from muros.rclc.errors import RclError as RclError
