@@ -1,6 +1,8 @@
 """Logical execution time: inputs at the start of a period, outputs at its end, and what follows when one is late."""
 
+import os
 import random
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -513,70 +515,128 @@ def until(condition: Callable[[], bool]) -> None:
     raise AssertionError("it did not come about within 20 s")
 
 
+class Crew:
+    """A plan with LOW_PRIORITY, whose callbacks run in threads: periods that end when those that can have ended."""
+
+    def __init__(self, local: InSpace, *callbacks: Callable[[Any], object] | None, **options: Any) -> None:
+        self.plan = Plan(local, *[0] * len(callbacks), overrun=LOW_PRIORITY, **options)
+        self.local = local
+        self.let: Any = self.plan.executor.let
+        self.tasks = self.plan.executor.tasks
+        for handle, publisher, callback in zip(
+            self.plan.executor.handles, self.plan.publishers, callbacks, strict=True
+        ):
+            if callback is not None:
+                handle.callback = lambda publisher=publisher, callback=callback: callback(publisher)
+
+    def period(self, *ended: int) -> list[str]:
+        """One period, over when those tasks have ended; the topics of what leaves."""
+        count = len(self.plan.heard.all)
+        self.let.begin(self.local.now, PERIOD)
+        until(lambda: all(self.tasks[i].done for i in ended))
+        self.local.now += PERIOD
+        self.let.finish()
+        return [topic for _, topic, _ in self.plan.heard.values()[count:]]
+
+
+class Gate:
+    """A callback that publishes and then waits until it may go on."""
+
+    def __init__(self) -> None:
+        self.open = threading.Event()
+        self.began = threading.Event()
+        self.niceness = 0
+
+    def __call__(self, publisher: Any) -> None:
+        publisher.publish(Int32(data=77))
+        self.began.set()
+        assert self.open.wait(20)
+        if hasattr(os, "PRIO_PROCESS"):
+            self.niceness = os.getpriority(os.PRIO_PROCESS, threading.get_native_id())
+
+
 def test_low_priority(local: InSpace) -> None:
     """A callback that blocks holds up nobody: others are called in the next period, its output comes when it ends."""
-    plan = Plan(local, 0, 0, 0, overrun=LOW_PRIORITY)
+    gate = Gate()
+    crew = Crew(local, None, gate, None)
     told: list[tuple[int, str]] = []
     local.context.on_problem(lambda code, text: told.append((code, text)))
-    gate, began, ended = threading.Event(), threading.Event(), threading.Event()
-    done = threading.Semaphore(0)
-    node = local.context.node("other")
-    publisher = node.publisher(Int32, "out_1")
-    handles = plan.executor.handles
-    first, last = handles[0].callback, handles[2].callback
-
-    def blocks() -> None:
-        publisher.publish(Int32(data=77))
-        began.set()
-        assert gate.wait(20)
-        ended.set()
-
-    def signals(callback: Callable[[], None]) -> Callable[[], None]:
-        def call() -> None:
-            callback()
-            done.release()
-
-        return call
-
-    handles[0].callback, handles[1].callback, handles[2].callback = signals(first), blocks, signals(last)
-    let: Any = plan.executor.let
-    tasks = plan.executor.tasks
-
-    def finished(number: int) -> None:
-        """So many of the quick callbacks have ended, as far as their tasks know."""
-        for _ in range(number):
-            assert done.acquire(timeout=20)
-        until(lambda: tasks[0].done and (number == 1 or tasks[2].done))
-
-    let.begin(local.now, PERIOD)
-    assert began.wait(20)
-    finished(1)
-    local.now += PERIOD
-    let.finish()
-    assert [(topic, value) for _, topic, value in plan.heard.values()] == [("out_0", 0)]
-    assert [task.state for task in tasks] == ["INACTIVE", "RUNNING", "RUNNING"], (
-        "the third came behind the second"
+    assert crew.period(0) == ["out_0"]
+    assert gate.began.wait(20)
+    assert [task.state for task in crew.tasks] == ["INACTIVE", "RUNNING", "RUNNING"], (
+        "the third came behind it"
     )
     assert [code for code, _ in told] == [OVERRUN, OVERRUN]
     assert told[0][1].startswith(
-        "blocks, the callback of the timer of 0 ms, has not ended 0 ms behind its let of 10 ms and goes on with low "
+        "<lambda>, the callback of the timer of 0 ms, has not ended 0 ms behind its let of 10 ms and goes on with low "
     )
-    let.begin(local.now, PERIOD)
-    finished(2)
-    local.now += PERIOD
-    let.finish()
-    assert sorted(topic for at, topic, _ in plan.heard.values() if at == 20) == ["out_0", "out_2"]
-    gate.set()
-    assert ended.wait(20)
-    until(lambda: tasks[1].done)
-    handles[1].callback = lambda: None
-    let.begin(local.now, PERIOD)
-    finished(2)
-    local.now += PERIOD
-    let.finish()
-    assert [value for at, topic, value in plan.heard.values() if topic == "out_1"] == [77]
-    assert tasks[1].state == "INACTIVE"
-    let.close()
+    assert crew.period(0, 2) == ["out_0", "out_2"]
+    assert crew.tasks[1].state == "RUNNING"
+    gate.open.set()
+    assert crew.period(0, 1, 2) == ["out_0", "out_1", "out_2"]
+    assert crew.plan.heard.values()[-2][2] == 77
+    assert (crew.tasks[1].state, crew.tasks[1].result, crew.tasks[1].overruns) == ("INACTIVE", "OVERRUN", 1)
+    if sys.platform == "linux":
+        assert gate.niceness == 10
+    assert crew.period(0, 1, 2) == ["out_0", "out_1", "out_2"]
+    crew.let.close()
+
+
+def test_low_priority_and_a_let_of_several_periods(local: InSpace) -> None:
+    """A callback that has time left is not late; the others are called in the next period by another thread."""
+    gate = Gate()
+    crew = Crew(local, None, gate, lets=(0, 0.03))
+    assert crew.period(0) == ["out_0"]
+    assert gate.began.wait(20)
+    assert crew.period(0) == ["out_0"]
+    gate.open.set()
+    assert crew.period(0, 1) == ["out_0", "out_1"]
+    assert (crew.plan.executor.overruns, gate.niceness) == (0, 0)
+    crew.let.close()
+
+
+def test_low_priority_of_who_is_late_and_has_ended(local: InSpace) -> None:
+    told: list[str] = []
+    local.context.on_problem(lambda code, text: told.append(text))
+
+    def late(publisher: Any) -> None:
+        publisher.publish(Int32(data=1))
+        local.now += 15
+
+    crew = Crew(local, late)
+    assert crew.period(0) == ["out_0"]
+    assert (crew.tasks[0].result, crew.tasks[0].overruns, crew.tasks[0].took) == ("OVERRUN", 1, 15)
+    assert "took 15 ms and ended 5 ms behind its let of 10 ms" in told[0]
+    crew.let.close()
+
+
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_low_priority_and_errors(local: InSpace, goes_on: bool) -> None:
+    local.context.on_problem(lambda code, text: None)
+
+    def fails(publisher: Any) -> None:
+        publisher.publish(Int32(data=1))
+        raise ValueError("no")
+
+    crew = Crew(local, fails, None, on_error=GO_ON if goes_on else None)
+    if goes_on:
+        assert crew.period(0, 1) == ["out_1"]
+        assert crew.tasks[0].result == "HANDLING_ERROR"
+    else:
+        with pytest.raises(ValueError, match="no"):
+            crew.period(0, 1)
+    assert crew.plan.executor.errors == 1
+    crew.let.close()
+
+
+def test_low_priority_as_it_is_spun(local: InSpace) -> None:
+    """With the executor's own periods, which virtual time ends whether a thread is ready or not: all of it comes."""
+    crew = Crew(local, None)
+    executor = crew.plan.executor
+    local.on_wait = lambda: executor.stop() if len(crew.plan.heard.all) >= 5 else time.sleep(0.001)
+    executor.spin_period()
+    assert len(crew.plan.heard.all) >= 5
+    assert {at % PERIOD for at, _, _ in crew.plan.heard.all} == {0}
 
 
 # Determinism

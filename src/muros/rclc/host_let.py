@@ -12,6 +12,7 @@ import os
 import queue
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from muros.client.raw import Raw
@@ -23,6 +24,10 @@ from muros.rclc.overruns import LOW_PRIORITY
 
 if TYPE_CHECKING:
     from muros.rclc.host_executor import Executor
+
+
+_LOW = 10
+"""The niceness of what goes on with low priority."""
 
 
 class HostTask(Task):
@@ -191,10 +196,10 @@ class HostLet(Let):
             raise error
 
     def _replace(self) -> None:
-        """Has a worker that is late go on with low priority, and another one do what it has not begun."""
+        """Leaves a worker that is busy to its callback, and has another one do what it has not begun."""
         worker = self._worker
         task = None if worker is None else worker.current
-        if worker is None or task is None or task.result != "OVERRUN":
+        if worker is None or task is None:
             return
         self._worker = None
         while True:
@@ -205,7 +210,8 @@ class HostLet(Let):
             if waiting is not None:
                 self._queue.append(waiting)
         worker.end()
-        worker.lower()
+        if task.result == "OVERRUN":
+            worker.lower()
         self._hand_on()
 
 
@@ -224,12 +230,16 @@ class _Worker:
         self.tasks.put(None)
 
     def lower(self) -> None:
-        """From now on it runs when nobody else wants to, as far as the system has such a thing."""
+        """From now on it runs behind others, as far as the system knows priorities of threads.
+
+        Not at the lowest: while it runs Python it holds the interpreter's lock, for which the others wait.
+        """
         number = self._thread.native_id
-        try:
-            os.sched_setscheduler(number or 0, os.SCHED_IDLE, os.sched_param(0))
-        except (AttributeError, OSError):
-            pass  # it goes on as quick as the others
+        if number is None:
+            return
+        with suppress(AttributeError, OSError):
+            os.sched_setscheduler(number, os.SCHED_OTHER, os.sched_param(0))
+            os.setpriority(os.PRIO_PROCESS, number, _LOW)
 
     def _work(self) -> None:
         let = self._let
