@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from muros import interfaces
+from muros.cli import main
 from muros.interfaces import Kind, message
 from muros.rclc import Arena, CapacityError, Rules, Text
 from muros.rclc.memory import check
@@ -247,3 +248,33 @@ def test_a_text_changes_in_its_place() -> None:
     carved = Text(Arena(bytearray(8)).take(6))
     carved.set(b"12345")
     assert str(carved) == "12345"
+
+
+def test_r24_sizes_are_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["interface", "memory", "std_msgs/MultiArrayLayout"]
+    assert main(words) == 0
+    assert capsys.readouterr().out == (
+        "dim              5 elements\n"
+        "dim.label       20 B of text\n"
+        "all of them          260 B in C on 64 bit\n"
+        "in one buffer        260 B\n"
+        "longest message      188 B; boards join its pieces with Session(largest=196)\n"
+    )
+    assert main([*words, "dim=1", "dim.label=3", "--word", "4"]) == 0
+    assert "all of them           23 B in C on 32 bit\n" in capsys.readouterr().out
+    assert main(["interface", "memory", "std_msgs/Int32"]) == 0
+    assert "has neither strings nor sequences" in capsys.readouterr().out
+    for rule, why in (
+        ("dims=3", "has no string or sequence 'dims'"),
+        ("dim", "'dim' is no rule such as name=8"),
+    ):
+        assert main([*words, rule]) == 1
+        assert why in capsys.readouterr().err
+
+
+def test_r24_board_classes_have_shapes_when_asked_for(tmp_path: Path) -> None:
+    words = ["interface", "generate", "--board", "std_msgs/String", "-o", str(tmp_path)]
+    assert main(words) == 0
+    assert "SHAPE" not in (tmp_path / "std_msgs/msg/_String.py").read_text()
+    assert main([*words, "--rules"]) == 0
+    assert 'SHAPE = "data:s"' in (tmp_path / "std_msgs/msg/_String.py").read_text()

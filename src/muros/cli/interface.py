@@ -23,7 +23,7 @@ def register(subparsers: Any) -> None:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    actions = parser.add_subparsers(required=True, metavar="show | list | proto | generate")
+    actions = parser.add_subparsers(required=True, metavar="show | list | proto | generate | memory")
     show = _command(actions, "show", _show, "print the definition of types")
     show.add_argument("types", nargs="+", metavar="TYPE", help="std_msgs/msg/Int32, or short std_msgs/Int32")
     show.add_argument("--full", action="store_true", help="with the definitions of nested types behind it")
@@ -48,10 +48,32 @@ def register(subparsers: Any) -> None:
     generate.add_argument("types", nargs="+", metavar="TYPE")
     generate.add_argument("-o", "--output", required=True, metavar="DIR", help="folder for the packages")
     generate.add_argument("--board", action="store_true", help="small classes for MicroPython")
+    generate.add_argument(
+        "--ros1", action="store_true", help="classes of ROS 1 for a program that plays a rosserial board"
+    )
     add_program(generate)
     generate.add_argument(
         "--action-services", action="store_true", help="boards: also what carries an action"
     )
+    generate.add_argument("--rules", action="store_true", help="boards: classes that memory rules can bound")
+    memory = _command(actions, "memory", _memory, "show what messages of a type may take under memory rules")
+    memory.add_argument("type", metavar="TYPE")
+    memory.add_argument(
+        "rules", nargs="*", metavar="PATH=SIZE", help="elements or bytes of text, as name=8 name.data=16"
+    )
+    for words, about in (("strings", "bytes of text"), ("messages", "elements"), ("numbers", "elements")):
+        memory.add_argument(
+            f"--{words}", type=int, default=0, metavar="N", help=f"{about} of {words} without a rule"
+        )
+    memory.add_argument(
+        "--word", type=int, choices=(4, 8), default=8, help="bytes of a pointer in C (default: 8)"
+    )
+
+
+def _memory(arguments: argparse.Namespace) -> None:
+    from muros.cli import _memory
+
+    _memory.show(arguments)
 
 
 def _command(
@@ -145,12 +167,18 @@ def _proto(arguments: argparse.Namespace) -> None:
 
 
 def _generate(arguments: argparse.Namespace) -> None:
-    if arguments.board:
+    if arguments.ros1:
+        from muros.rosserial import types
+
+        ends = ((name.partition("/")[0], name.rpartition("/")[2]) for name in arguments.types)
+        files = types.write(map("/".join, ends), arguments.output)
+    elif arguments.board:
         from muros.interfaces import board
 
         constants = constants_of(arguments.program)
+        shapes = arguments.rules or (constants is not None and "Rules" in constants)
         files = board.generate(
-            arguments.types, arguments.output, arguments.action_services, constants=constants
+            arguments.types, arguments.output, arguments.action_services, constants=constants, shapes=shapes
         )
         if constants is None:
             report_constants(arguments.types, sys.stderr)
