@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from muros.ros1 import ParameterTree, Ros1Error, Ros1Node
+from muros.ros1 import ParameterTree, Ros1Error, Ros1Node, call
 from tests.dds.peers import Peer
 from tests.ros1.peers import Master
 
@@ -78,6 +78,9 @@ def test_topics_both_ways(master: Master, ros: Peer) -> None:
             await until(lambda: len(got) == 100)
             assert set(got) == {text("down")}
             assert (up.dropped, node.reports) == (0, [])
+            bus = await call(node.uri, "getBusInfo", "/test")
+            assert [row[2:] for row in bus] == [["o", "TCPROS", "/up", True], ["i", "TCPROS", "/down", True]]
+            assert bus[0][1] == "/peer"
             state = await ros.ask("state")
             assert state["publishers"]["/up"] == ["/muros"]
             assert state["subscribers"]["/down"] == ["/muros"]

@@ -201,6 +201,24 @@ def test_answers_that_are_none(answer: bytes) -> None:
     asyncio.run(main())
 
 
+def test_requests_that_would_grow_without_end() -> None:
+    """Entities within entities: each line ten times the one before."""
+    lines = [f'<!ENTITY e{n} "{f"&e{n - 1};" * 10}">' for n in range(1, 12)]
+    entities = f'<!ENTITY e0 "0123456789">{"".join(lines)}'
+    bomb = f'<?xml version="1.0"?><!DOCTYPE m [{entities}]><methodCall>&e11;</methodCall>'
+
+    async def test(uri: str) -> None:
+        host, _, port = uri.removeprefix("http://").rstrip("/").partition(":")
+        reader, writer = await asyncio.open_connection(host, int(port))
+        writer.write(f"POST / HTTP/1.0\r\nContent-Length: {len(bomb)}\r\n\r\n{bomb}".encode())
+        assert b"fault" in await reader.read()
+        writer.close()
+        await writer.wait_closed()
+        assert await call(uri, "add", "/me", 2, 3) == 5
+
+    asyncio.run(with_server(test))
+
+
 @given(st.binary(max_size=80))
 def test_requests_that_are_none(raw: bytes) -> None:
     async def test(uri: str) -> None:

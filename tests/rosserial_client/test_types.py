@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from muros import interfaces
+from muros.cli import main
 from muros.interfaces import InterfaceError, converter, ros1_name
 from muros.rosserial import types
 from muros.rosserial.messages import MessageError
@@ -109,3 +110,15 @@ def test_unknown_types() -> None:
     with pytest.raises(InterfaceError):
         types.service("std_srvs/SetBoole")
     assert types.service("std_srvs/SetBool") is types.service("std_srvs/SetBool")
+
+
+def test_the_command_writes_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["interface", "generate", "--ros1", "std_msgs/msg/String", "std_srvs/SetBool", "std_msgs/Time"]
+    assert main([*words, "-o", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out.split()
+    assert [Path(name).name for name in printed] == ["__init__.py", "std_msgs.py", "std_srvs.py"]
+    text = (tmp_path / "ros1/std_msgs.py").read_text()
+    assert "class String(Message):" in text
+    assert "class Time(Message):" in text
+    assert main(["interface", "generate", "--ros1", "std_msgs/Strung", "-o", str(tmp_path)]) == 1
+    assert "did you mean std_msgs/msg/String?" in capsys.readouterr().err

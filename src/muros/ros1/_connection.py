@@ -18,7 +18,8 @@ OnLost = Callable[["Connection"], object]
 class Connection(asyncio.Protocol):
     """Calls ``on_block(connection, body)`` for each block and ``on_lost(connection)`` once, when it is over.
 
-    ``blocks`` may be set to another limit or lead from within ``on_block``. ``problem`` says why we ended it, if so.
+    ``blocks`` may be set to another limit or lead from within ``on_block``. ``problem`` says why we ended it, if so;
+    ``caller`` may hold the name of the node at the other end.
     """
 
     def __init__(self, on_block: OnBlock, on_lost: OnLost) -> None:
@@ -27,6 +28,7 @@ class Connection(asyncio.Protocol):
         self.blocks = Blocks()
         self.problem = ""
         self.peer = ""
+        self.caller = ""
         self._transport: asyncio.Transport | None = None
 
     @property

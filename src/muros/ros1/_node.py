@@ -59,7 +59,7 @@ class Ros1Node:
         self._report = report or (lambda code, what, why, remedy: None)
         self._api = ApiServer(
             {
-                "getBusInfo": lambda caller: [],
+                "getBusInfo": self._bus_info,
                 "getBusStats": lambda caller: [[], [], []],
                 "getMasterUri": lambda caller: self.master,
                 "getPid": lambda caller: os.getpid(),
@@ -268,6 +268,17 @@ class Ros1Node:
         return f"rosrpc://{self.host}:{self._port}"
 
     # ---- what other nodes want ----
+
+    def _bus_info(self, caller: str) -> list[list[Any]]:
+        """Every connection of a topic, as ``rosnode info`` shows them."""
+        found: list[tuple[str, str, str]] = []
+        for publication in self._publications.values():
+            found += [(node, "o", publication.kind.topic) for node in publication.callers]
+        for subscription in self._subscriptions:
+            found += [(uri, "i", subscription.kind.topic) for uri in sorted(subscription.connected)]
+        return [
+            [number, other, way, "TCPROS", topic, True] for number, (other, way, topic) in enumerate(found, 1)
+        ]
 
     def _on_publishers(self, caller: str, topic: str, publishers: list[str]) -> int:
         if isinstance(publishers, list):

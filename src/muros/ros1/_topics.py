@@ -75,6 +75,11 @@ class Publication:
         """Subscribers that are connected."""
         return len(self._connections)
 
+    @property
+    def callers(self) -> list[str]:
+        """The nodes that are connected."""
+        return [connection.caller for connection in self._connections]
+
     def publish(self, body: bytes) -> None:
         """Sends a message to every subscriber that has taken what it got before."""
         data = block(body)
@@ -90,6 +95,7 @@ class Publication:
         """A subscriber has connected and sent its header. Raises :class:`Ros1Error` if it is turned away."""
         if objection := self.kind.objection(fields):
             raise Ros1Error(objection)
+        connection.caller = fields.get("callerid", "")
         connection.on_block = _ignore
         connection.on_lost = self._connections.remove
         connection.send(header({**self.kind.fields(self._node), "latching": str(int(self.latch))}))

@@ -11,7 +11,8 @@
         chatter.publish(String("hello"))
 
 Types are classes with ``TYPE``, ``MD5``, ``size()``, ``write(buf, off)`` and ``read(buf, off, end)``. On hosts
-``muros.rosserial.types.message("std_msgs/String")`` makes them, and ``write`` of that module writes them for boards.
+``muros.rosserial.types.message("std_msgs/String")`` makes them; ``muros interface generate --ros1`` writes them for
+boards.
 """
 
 from muros.compat import const, ticks_add, ticks_diff, ticks_ms
