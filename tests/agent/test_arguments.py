@@ -148,9 +148,11 @@ def test_the_domain_override() -> None:
     [
         (
             "",
-            "no transport: say udp4, udp6, tcp4, tcp6, serial, multiserial, pseudoterminal, canfd; for example:",
+            "no transport: say udp4, udp6, tcp4, tcp6, serial, multiserial, pseudoterminal, canfd, rosserial; for",
         ),
         ("-v 5", "no transport: say"),
+        ("rosserial", "rosserial: -D DEV or -f FILE or -p PORT is required"),
+        ("rosserial -p 11411 -D /dev/ttyACM0", "rosserial: -p: give either -D DEV or -f FILE or -p PORT"),
         ("upd4 -p 8888", "unknown transport 'upd4' (did you mean udp4?); there are udp4, udp6,"),
         ("warp -p 8888", "unknown transport 'warp'; there are udp4,"),
         ("udp4", "udp4: -p PORT is required"),

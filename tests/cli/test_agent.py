@@ -16,6 +16,9 @@ from muros import cli
 from muros.agent.arguments import parse_arguments
 from muros.cli.agent import make_links
 from muros.links import DiscoveryLink
+from muros.rosserial.node_handle import NodeHandle
+from muros.rosserial.tcp import Tcp
+from muros.rosserial.types import message
 
 CREATE_CLIENT = bytes.fromhex("80000000 00011000 58524345 0100010f ba5eba11 8100fc01")
 CREATE_PARTICIPANT = bytes.fromhex(
@@ -64,6 +67,37 @@ def client(port: int) -> Iterator[socket.socket]:
         sock.settimeout(20)
         sock.connect(("127.0.0.1", port))
         yield sock
+
+
+def test_a_rosserial_board_meets_the_others_in_one_space() -> None:
+    with running("udp4 -p 0 --bind 127.0.0.1 rosserial -p 0 --bind 127.0.0.1") as agent:
+        matched = re.fullmatch(
+            r"muros agent \S+ · local space · udp4 \S+ · tcp4 127\.0\.0\.1:(\d+)", agent.banner
+        )
+        assert matched
+        line = Tcp("127.0.0.1", int(matched[1]))
+        node = NodeHandle(line)
+        node.advertise("chatter", message("std_msgs/String"))
+        while not node.connected:
+            node.spin_once(10)
+        agent.line("Setup publisher on chatter [std_msgs/String]")
+        agent.line("board 127.0.0.1: node /serial_node_127_0_0_1: 1 publisher")
+        assert agent.stop() == 0
+        while node.connected:
+            node.spin_once(10)
+        line.close()
+
+
+def test_links_for_rosserial_are_asked_for_as_others() -> None:
+    options = parse_arguments(
+        ["rosserial", "-D", "/dev/ttyACM0 /dev/ttyACM1", "rosserial", "-p", "0", "-b", "9600"]
+    )
+    assert options is not None
+    assert [(link.devices, link.port, link.baudrate) for link in options.links] == [
+        (("/dev/ttyACM0", "/dev/ttyACM1"), 0, 57600),
+        ((), 0, 9600),
+    ]
+    assert list(make_links(options)) == []
 
 
 def test_a_client_comes_and_goes() -> None:

@@ -14,6 +14,8 @@ DISCOVERY_PORT: Final = 7400
 """Where clients look for agents unless told otherwise."""
 BAUDRATE: Final = 115200
 """Bits per second of a serial line unless told otherwise."""
+ROSSERIAL_BAUDRATE: Final = 57600
+"""The same for boards with rosserial firmware."""
 VERBOSE: Final = 4
 """How much is told unless told otherwise: clients that come and go."""
 
@@ -59,11 +61,15 @@ TRANSPORTS: Final = {
     "multiserial": Transport(_DEVICE_NEEDED, "several serial ports"),
     "pseudoterminal": Transport((), "a serial line without hardware; prints its far end"),
     "canfd": Transport((("device",),), "CAN FD through SocketCAN"),
+    "rosserial": Transport(
+        (("device", "file", "port"),), "boards with rosserial firmware: serial ports, or TCP"
+    ),
 }
 
 IP_TRANSPORTS = frozenset({"udp4", "udp6", "tcp4", "tcp6"})
 _SERIAL = frozenset({"serial", "multiserial"})
-_TERMINAL = _SERIAL | {"pseudoterminal"}
+_TERMINAL = _SERIAL | {"pseudoterminal", "rosserial"}
+_LISTENING = IP_TRANSPORTS | {"rosserial"}
 _ALL: frozenset[str] = frozenset()
 
 Value: TypeAlias = str | int | float | bool | Path
@@ -141,11 +147,9 @@ def _one_of(words: Sequence[str], what: str) -> Callable[[str], str]:
 
 
 OPTIONS: Final = (
+    Option("port", ("-p", "--port"), "port to listen on", "PORT", integer(0, 65535), transports=_LISTENING),
     Option(
-        "port", ("-p", "--port"), "port to listen on", "PORT", integer(0, 65535), transports=IP_TRANSPORTS
-    ),
-    Option(
-        "bind", ("--bind",), "address to listen on (default: all)", "ADDR", _address, transports=IP_TRANSPORTS
+        "bind", ("--bind",), "address to listen on (default: all)", "ADDR", _address, transports=_LISTENING
     ),
     Option(
         "discovery",
@@ -171,11 +175,17 @@ OPTIONS: Final = (
         "DEV",
         transports=_TERMINAL | {"canfd"},
     ),
-    Option("file", ("-f", "--file"), "read the device from this file", "FILE", transports=_SERIAL),
+    Option(
+        "file",
+        ("-f", "--file"),
+        "read the device from this file",
+        "FILE",
+        transports=_SERIAL | {"rosserial"},
+    ),
     Option(
         "baudrate",
         ("-b", "--baudrate"),
-        f"bits per second (default {BAUDRATE})",
+        f"bits per second (default {BAUDRATE}; rosserial {ROSSERIAL_BAUDRATE})",
         "BAUD",
         _baudrate,
         BAUDRATE,

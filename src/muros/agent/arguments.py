@@ -27,6 +27,7 @@ from muros.agent._options import (
     MIDDLEWARES,
     NO_EFFECT,
     OPTIONS,
+    ROSSERIAL_BAUDRATE,
     TRANSPORTS,
     VERBOSE,
     Option,
@@ -135,10 +136,10 @@ def help_text() -> str:
         "",
     ]
     groups = (
-        ("options of udp and tcp, behind the transport:", lambda o: o.transports == IP_TRANSPORTS),
+        ("options of udp and tcp, behind the transport:", _listens),
         (
             "options of serial and CAN, behind the transport:",
-            lambda o: o.transports and o.transports != IP_TRANSPORTS,
+            lambda o: o.transports and not _listens(o),
         ),
         ("options of the agent, anywhere:", lambda o: not o.transports),
     )
@@ -153,6 +154,10 @@ def help_text() -> str:
         "With -m dds those of ROS 2 hold: ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE, ROS_STATIC_PEERS."
     )
     return "\n".join(lines)
+
+
+def _listens(option: Option) -> bool:
+    return option.transports >= IP_TRANSPORTS
 
 
 @dataclass(slots=True)
@@ -298,7 +303,7 @@ def _link(place: _Place) -> LinkOptions:
         bind=values.get("bind"),
         discovery_port=values.get("discovery") or None,
         devices=_devices(place),
-        baudrate=values.get("baudrate", BAUDRATE),
+        baudrate=values.get("baudrate", ROSSERIAL_BAUDRATE if place.kind == "rosserial" else BAUDRATE),
         can_id=values.get("id", 1),
     )
     if options.bind and ipaddress.ip_address(options.bind).version != options.family:
@@ -307,7 +312,7 @@ def _link(place: _Place) -> LinkOptions:
 
 
 def _devices(place: _Place) -> tuple[str, ...]:
-    several = place.kind == "multiserial"
+    several = place.kind in ("multiserial", "rosserial")
     if "file" in place.values:
         try:
             return tuple(devices_from_file(str(place.values["file"]), several=several))

@@ -4,12 +4,13 @@ import asyncio
 import signal
 import sys
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from muros import __version__
-from muros.agent import Agent, Event, LinkUp
+from muros.agent import Agent, LinkUp
 from muros.agent.arguments import AgentOptions, LinkOptions, UsageError, help_text, parse_arguments
 from muros.agent.profiles import NamedReferences, Profiles, ProfilesError, ReferenceChain
-from muros.cli._log import DEBUG, STYLES, Log, Message
+from muros.cli._log import DEBUG, STYLES, Log, Message, Told
 from muros.cli._tap import Tap
 from muros.findings import Finding, Findings
 from muros.links import (
@@ -23,6 +24,9 @@ from muros.links import (
     SerialLink,
 )
 from muros.space import Space, SpaceError, open_space
+
+if TYPE_CHECKING:
+    from muros.rosserial.server import Server
 
 FAILED = 1
 WRONG_USE = 2
@@ -48,9 +52,14 @@ def run(argv: Sequence[str]) -> int:
 
 
 def make_links(options: AgentOptions) -> Iterator[tuple[Link, list[Link] | None]]:
-    """The links that are asked for, closed; and one discovery link for each port, with the links it announces."""
+    """The links that are asked for, closed; and one discovery link for each port, with the links it announces.
+
+    Those for rosserial are not the agent's, see `make_rosserial`.
+    """
     discovery: dict[int, tuple[Link, list[Link]]] = {}
     for asked in options.links:
+        if asked.kind == "rosserial":
+            continue
         link = _make_link(asked)
         yield link, None
         port = asked.discovery_port
@@ -60,6 +69,21 @@ def make_links(options: AgentOptions) -> Iterator[tuple[Link, list[Link] | None]
                 discovery[port] = DiscoveryLink(port, interface=one), []
             discovery[port][1].append(link)
     yield from discovery.values()
+
+
+def make_rosserial(options: AgentOptions, space: Space) -> "Server | None":
+    """A rosserial server on the agent's space, for the links that ask for one."""
+    wanted = [asked for asked in options.links if asked.kind == "rosserial"]
+    if not wanted:
+        return None
+    from muros.rosserial.server import Server, serial_line, tcp_line
+
+    server = Server(space)
+    for asked in wanted:
+        server.add_link(
+            serial_line(asked.devices, asked.baudrate) if asked.devices else tcp_line(asked.port, asked.bind)
+        )
+    return server
 
 
 def _make_link(options: LinkOptions) -> Link:
@@ -93,15 +117,20 @@ async def _serve(options: AgentOptions, profiles: Profiles) -> None:
         agent.add_link(
             added[link], announces=None if announced is None else [added[each] for each in announced]
         )
-    links = list(added)
-    early: list[Event | Finding] = []
-    unwatch = agent.on_event(early.append), agent.on_finding(early.append)
+    rosserial = make_rosserial(options, space)
+    links = [*added, *(rosserial.links if rosserial is not None else [])]
+    early: list[Told | Finding] = []
+    unwatch = [agent.on_event(early.append), agent.on_finding(early.append)]
+    if rosserial is not None:
+        unwatch.append(rosserial.on_event(early.append))
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, stop.set)
     await agent.start()
     try:
+        if rosserial is not None:
+            await rosserial.start()
         # The banner comes first: only open links know their ports.
         log.started(_banner(space, links), [link.name for link in links])
         for end in unwatch:
@@ -112,9 +141,13 @@ async def _serve(options: AgentOptions, profiles: Profiles) -> None:
             elif not (isinstance(each, LinkUp) and options.log_style == "muros" and _in_banner(each)):
                 log.event(each)
         agent.on_event(log.event)
+        if rosserial is not None:
+            rosserial.on_event(log.event)
         agent.on_finding(log.finding)
         await stop.wait()
     finally:
+        if rosserial is not None:
+            await rosserial.stop()
         agent.close()
         space.close()
 
