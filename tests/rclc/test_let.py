@@ -28,6 +28,8 @@ from muros.rclc import (
 )
 from muros.rclc.let import OVERRUN, Task
 from muros.space import Topic
+from tests.client.world import World
+from tests.rclc.test_rclc import Board
 from tests.rclc.virtual import WAYS, Bench, InSpace
 
 from example_interfaces.srv import AddTwoInts
@@ -754,3 +756,42 @@ def test_outputs_never_leave_before_the_end_and_depend_on_no_speed() -> None:
         inputs = {at for at, _, _ in slow.heard.all if at % PERIOD}
         assert not inputs, f"seed {seed}: something left at {inputs}"
     assert computed > 50, "most of them did take time"
+
+
+def through_a_bad_network(seed: int) -> tuple[list[tuple[int, int, int]], list[tuple[int, int]]]:
+    """Two boards and an agent on a network that loses a tenth: the calls at one, with LET, and what the other hears."""
+    world = World(seed, loss=0.1, duplicate=0.05, reorder=0.05)
+    talker, board = Board(world, "talker", queue=32), Board(world, "board", queue=32)
+    calls: list[tuple[int, int, int]] = []
+    heard: list[tuple[int, int]] = []
+    outputs = [board.node.publisher(Int32, f"out_{i}") for i in range(2)]
+    executor = board.executor(semantics=LET, period=0.02)
+
+    def caller(i: int) -> Callable[[Any], None]:
+        def call(message: Any) -> None:
+            calls.append((world.now, i, message.data))
+            outputs[i].publish(Int32(data=10 * message.data + i))
+
+        return call
+
+    for i in range(2):
+        executor.add(board.node.subscription(Int32, f"in_{i}", None), caller(i))
+        talker.node.subscription(Int32, f"out_{i}", lambda message: heard.append((world.now, message.data)))
+    inputs = [talker.node.publisher(Int32, f"in_{i}") for i in range(2)]
+    hearing = talker.executor()
+    world.sessions.append(talker.session)  # served while the board waits
+    for period in range(150):
+        if period >= 50:  # they are connected
+            inputs[period % 2].publish(Int32(data=period))
+        executor.spin_one_period()
+        hearing.work(world.now)
+    return calls, heard
+
+
+def test_the_same_network_gives_the_same_callbacks() -> None:
+    calls = 0
+    for seed in range(12):
+        first, again = through_a_bad_network(seed), through_a_bad_network(seed)
+        assert first == again, f"seed {seed}"
+        calls += len(first[0])
+    assert calls > 300
