@@ -98,6 +98,8 @@ rclc.host_executor Executor
 rclc.host_handles GuardCondition Subscription Timer
 rclc.hosts Context Node
 rclc.groups BEST_EFFORT CallbackGroup REAL_TIME_CRITICAL RealTimeClass SOFT_REAL_TIME ThreadError Threads
+rclc.sense_plan_act SensePlanAct
+rclc.workers Workers
 rclc.host_clock Clock
 rclc.host_parameters Parameters
 rclc.parameter_files ParameterClient

@@ -68,11 +68,13 @@ if TYPE_CHECKING:
     from muros.rclc.semantics import LET as LET
     from muros.rclc.semantics import ON_NEW_DATA as ON_NEW_DATA
     from muros.rclc.semantics import RCLCPP as RCLCPP
+    from muros.rclc.sense_plan_act import SensePlanAct as SensePlanAct
     from muros.rclc.streaming import Streamer as Streamer
     from muros.rclc.triggers import all_of as all_of
     from muros.rclc.triggers import always as always
     from muros.rclc.triggers import any_of as any_of
     from muros.rclc.triggers import one as one
+    from muros.rclc.workers import Workers as Workers
 
 if not MPY:
     from muros.compat import names
