@@ -92,6 +92,24 @@ def test_what_it_says() -> None:
     assert str(writer.qos) == "reliable, transient local, keep last 1"
 
 
+def test_names_that_ros_does_not_have_are_left_out() -> None:
+    lab = Lab().read()
+    strange = lab.world.space.participant("caf\u00e9")
+    strange.writer(Topic("rt/one", STRING))
+    long = lab.world.space.participant("long")
+    long.writer(Topic("rt/" + "x" * 300, STRING))
+    long.writer(Topic("rt/\udcff", STRING))
+    long.writer(Topic("rt/two", "y" * 300))
+    long.writer(Topic("rt/three", STRING))
+    lab.world.space.participant("z" * 300)
+    lab.world.run(300)
+    assert lab.nodes() == {
+        "/host": [],
+        "/lab/board": [],
+        "/long": [(PUBLISHER, "/three", ["std_msgs/msg/String"])],
+    }
+
+
 def test_a_client_that_creates_in_xml_as_micro_ros_does() -> None:
     lab = Lab(creation="xml").read()
     lab.world.run(200)

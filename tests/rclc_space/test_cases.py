@@ -407,7 +407,8 @@ def test_r20_to_r22_an_agent_is_found_asked_and_believed() -> None:
         context.node("one")
         assert context.wait_connected(PATIENCE)
         assert context.ping(PATIENCE), "and within it"
-        sync = TimeSync(context.middleware)
+        session: Any = context.middleware
+        sync = TimeSync(session)
         end = time.monotonic() + PATIENCE
         while not sync.synchronized():
             assert time.monotonic() < end

@@ -20,6 +20,8 @@ __all__ = ["GraphTopic"]
 TOPIC: Final = Topic("ros_to_microros_graph", "micro_ros_msgs::msg::dds_::Graph_")
 DELAY: Final = 50
 """Milliseconds in which changes are gathered."""
+PACE: Final = 1000
+"""Bytes of the graph for which they are gathered a millisecond longer: large ones take their time."""
 LONGEST_NAME: Final = 256
 """Characters that the type leaves for a name."""
 
@@ -75,7 +77,8 @@ class _Domain:
 
     def _changed(self, event: GraphEvent) -> None:
         if self._call is None:
-            self._call = self._core.call_at(self._core.now + DELAY, self._publish)
+            delay = DELAY + len(self._said) // PACE
+            self._call = self._core.call_at(self._core.now + delay, self._publish)
 
     def _publish(self) -> None:
         self._call = None
@@ -95,13 +98,15 @@ class _Domain:
         graph = self._core.space.graph
         entities: dict[str, dict[tuple[int, str], set[str]]] = {}
         for end in endpoints_of(graph, self._domain):
-            if max(len(end.name), len(end.type)) <= LONGEST_NAME:
+            if _fits(end.name, end.type):
                 key = (KINDS.index(end.kind), end.name)
                 entities.setdefault(end.node, {}).setdefault(key, set()).add(end.type)
         made: Any = interfaces.message("micro_ros_msgs/msg/Graph")()
         make_node = interfaces.message("micro_ros_msgs/msg/Node")
         make_entity = interfaces.message("micro_ros_msgs/msg/Entity")
         for name in nodes_of(graph, self._domain):
+            if not _fits(name):
+                continue
             node: Any = make_node()
             namespace, _, node.node_name = name.rpartition("/")
             node.node_namespace = namespace or "/"
@@ -110,3 +115,8 @@ class _Domain:
             made.nodes.append(node)
         data: bytes = made.serialize()
         return data
+
+
+def _fits(*names: str) -> bool:
+    """Whether names are of the kind that ROS has: what others announce may be anything."""
+    return all(name.isascii() and len(name) <= LONGEST_NAME for name in names)

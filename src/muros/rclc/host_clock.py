@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from muros.rclc import handles
 from muros.rclc.host_logger import system_time
 from muros.rclc.ros_time import RosTime, RosTimer, clock_class
 from muros.rclc.timer import Timer
@@ -87,6 +88,12 @@ class ClockTimer(RosTimer):
     """Made by ``Clock.timer``; see ``Timer``. With simulated time it is still until that is known."""
 
     _time: Clock
+
+    def destroy(self) -> None:
+        """Takes it away."""
+        if self in self._time.timers:
+            self._time.timers.remove(self)
+        handles.destroy(self)
 
     def left(self, now: int) -> int:
         """Milliseconds until its time comes; with simulated time what brings it is a message."""

@@ -85,7 +85,8 @@ class Graph:
         self._read: tuple[list[str], list[Endpoint]] = ([], [])
         self._fresh = -1
         self._told = False
-        middleware: Any = node.context.middleware
+        sharing = node.context.sharing  # what comes is for no handle: whichever thread takes it
+        middleware: Any = node.context.middleware if sharing is None else sharing.real
         self._source: GraphSource
         if hasattr(middleware, "graph_source"):
             self._source = middleware.graph_source(node.participant, self._changed)
