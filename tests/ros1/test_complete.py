@@ -27,7 +27,7 @@ from tests.ros1.peers import Master, require_tools
 
 PROGRAM = Path(__file__).resolve().parent / "programs/micropython_board.py"
 SOURCES = ROOT / "build/peers/micropython-rosserial"
-ADDRESS = ("--tcp", "0", "--bind", "127.0.0.1", "--name", "serial_node")
+ADDRESS = ("--bind", "127.0.0.1", "--name", "serial_node", "--tcp")
 LIMIT = 40.0
 """Seconds that a command of ROS 1 may take on a busy machine."""
 
@@ -45,10 +45,10 @@ def ros(master: Master) -> Iterator[Peer]:
 
 
 @contextmanager
-def serving(master: Master, *words: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
+def serving(master: Master, *words: str, port: int = 0) -> Iterator[tuple[subprocess.Popen[str], int]]:
     """`muros rosserial --ros1` and the port where boards dial in."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "muros", "rosserial", "--ros1", *ADDRESS, *words],
+        [sys.executable, "-m", "muros", "rosserial", "--ros1", *ADDRESS, str(port), *words],
         env=master.environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -266,5 +266,23 @@ def test_micropython_rosserial(master: Master, ros: Peer) -> None:
         finally:
             board.kill()
             board.communicate()
+    ros.do("destroy", thing=heard)
+    ros.do("destroy", thing=says)
+
+
+def test_the_server_is_killed_and_started_again(master: Master, ros: Peer) -> None:
+    heard = ros.do("subscriber", topic="/b/str", type="std_msgs/String")
+    says = ros.do("publisher", topic="/h/str", type="std_msgs/String")
+    with serving(master, "--space", "none") as (process, port), Board(port) as board:
+        ros.do("wait_for_publishers", subscriber=heard)
+        process.kill()
+        process.wait(20)
+        with serving(master, "--space", "none", port=port):
+            start = time.monotonic()
+            while not ros.do("count", subscriber=heard, wait=0.02):
+                ros.do("publish", publisher=says, message={"data": "again"})
+                assert time.monotonic() < start + LIMIT
+            assert ros.do("take", subscriber=heard)[0] == {"data": "echo again"}
+            assert set(board.heard) == {"again"}
     ros.do("destroy", thing=heard)
     ros.do("destroy", thing=says)
