@@ -93,7 +93,8 @@ def names(places: str, package: str) -> list[str]:
 HOSTS = """
 client.hosts Session
 rclc.action_hosts ActionClient ActionServer
-rclc.host_entities Client Service
+rclc.host_entities Client Publisher Service
+rclc.host_events Event
 rclc.host_executor Executor
 rclc.host_handles GuardCondition Subscription Timer
 rclc.hosts Context Node
@@ -101,6 +102,7 @@ rclc.groups BEST_EFFORT CallbackGroup REAL_TIME_CRITICAL RealTimeClass SOFT_REAL
 rclc.sense_plan_act SensePlanAct
 rclc.workers Workers
 rclc.host_clock Clock
+rclc.host_graph Endpoint Graph
 rclc.host_parameters Parameters
 rclc.parameter_files ParameterClient
 rclc.remapping ArgumentsError RosArguments remove_ros_arguments

@@ -35,8 +35,12 @@ if TYPE_CHECKING:
     from muros.rclc.handle_error import HandleError as HandleError
     from muros.rclc.host_clock import Clock as Clock
     from muros.rclc.host_entities import Client as Client
+    from muros.rclc.host_entities import Publisher as Publisher
     from muros.rclc.host_entities import Service as Service
+    from muros.rclc.host_events import Event as Event
     from muros.rclc.host_executor import Executor as Executor
+    from muros.rclc.host_graph import Endpoint as Endpoint
+    from muros.rclc.host_graph import Graph as Graph
     from muros.rclc.host_handles import GuardCondition as GuardCondition
     from muros.rclc.host_handles import Subscription as Subscription
     from muros.rclc.host_handles import Timer as Timer
