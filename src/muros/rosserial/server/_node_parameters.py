@@ -11,7 +11,17 @@ from muros.rclc.parameter_files import kind
 from muros.rclc.parameters import Parameters
 from muros.space import Participant, Qos, Service, Topic, Writer
 
-__all__ = ["NodeParameters"]
+__all__ = ["PARAMETER_KINDS", "NodeParameters"]
+
+PARAMETER_KINDS = (
+    "GetParameters",
+    "GetParameterTypes",
+    "SetParameters",
+    "SetParametersAtomically",
+    "ListParameters",
+    "DescribeParameters",
+)
+"""The services of a node's parameters, in rcl_interfaces/srv."""
 
 
 class NodeParameters:

@@ -159,6 +159,8 @@ class Server:
         self._loop = asyncio.get_running_loop()
         self._closed = asyncio.Event()
         try:
+            if self._in_space is not None:
+                self._in_space.warm()
             if self.space is not None:
                 self.space.attach(self._loop)
             for link in self.links:

@@ -13,7 +13,7 @@ from typing import Any
 from muros import interfaces
 from muros.interfaces import CdrError, Converter, InterfaceError
 from muros.rosserial.server._door import BodyError, RefusedError
-from muros.rosserial.server._node_parameters import NodeParameters
+from muros.rosserial.server._node_parameters import PARAMETER_KINDS, NodeParameters
 from muros.rosserial.server._parameters import plain_name
 from muros.space import (
     CDR_LE,
@@ -69,6 +69,13 @@ class SpaceWorld:
         self._parameters = parameters
         self._nodes: list[SpaceNode] = []
         self._unwatch = space.graph.watch(self._on_graph)
+
+    def warm(self) -> None:
+        """Reads what the first board would have to wait for: the definitions of the standard types."""
+        interfaces.converter("std_msgs/String")
+        interfaces.message("rcl_interfaces/msg/Log")
+        for kind in PARAMETER_KINDS:
+            interfaces.service(f"rcl_interfaces/srv/{kind}")
 
     def node(self, name: str, owner: str) -> SpaceNode:
         """A node for a board."""
