@@ -186,6 +186,41 @@ def test_one_executor_runs_a_handle(local: InSpace) -> None:
     assert topics.got == [(0, 1), (7, 2)]
 
 
+def test_a_whole_node(local: InSpace) -> None:
+    node, other = local.context.node("node"), local.context.node("other")
+    calls: list[str] = []
+    first = node.timer(0, lambda: calls.append("first"))
+    other.timer(0, lambda: calls.append("other"))
+    node.subscription(Int32, "topic", lambda message: calls.append("second"))
+    parameters = node.parameters()
+    executor, mine = local.executor(), local.executor()
+    mine.add(first)
+    executor.add_node(node)
+    assert len(executor.handles) == 1 + len(parameters.handles)
+    local.talker.node("talker").publisher(Int32, "topic").publish(Int32())
+    assert executor.spin_some()
+    assert calls == ["second"]
+    with pytest.raises(HandleError, match="node 'node' belongs to another context"):
+        Executor(local.talker).add_node(node)
+    with pytest.raises(CapacityError):
+        local.executor(1).add_node(made_with_two(local))
+
+
+def made_with_two(local: InSpace) -> Any:
+    """A node with two timers."""
+    node = local.context.node("two")
+    node.timer(1.0, print)
+    node.timer(1.0, print)
+    return node
+
+
+def test_spin_some_waits_as_long_as_it_takes(local: InSpace) -> None:
+    local.context.node("n").timer(5000.0, print)
+    start = local.now
+    assert local.executor().spin_some(None)
+    assert local.now - start == 5_000_000
+
+
 def test_x13_spin_timer(bench: Bench) -> None:
     calls: list[int] = []
     bench.context.node("n").timer(0.1, lambda: calls.append(bench.now))

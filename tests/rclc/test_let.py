@@ -295,6 +295,16 @@ def test_always_with_let(local: InSpace) -> None:
     assert got == [None, None, 5, None]
 
 
+def test_always_with_let_waits_for_news_when_it_has_no_period(local: InSpace) -> None:
+    got: list[int | None] = []
+    executor = local.executor(semantics=LET, trigger=always)
+    subscription = local.context.node("node").subscription(Int32, "in", None)
+    executor.add(subscription, lambda m: got.append(None if m is None else m.data), when=ALWAYS)
+    start = local.now
+    assert executor.spin_some(0.5)
+    assert (got, local.now - start) == ([None], 500)
+
+
 # Overruns
 
 

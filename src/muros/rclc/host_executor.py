@@ -151,6 +151,19 @@ class Executor(executor_.Executor):
         elif when == ALWAYS:
             self.always.append(handle)
 
+    def add_node(self, node: context_.Node) -> None:
+        """Adds what was made on a node and no other executor has, in the order of making.
+
+        Raises CapacityError when the executor is full, HandleError for a node of another context.
+        """
+        if node.context is not self.context:
+            raise HandleError(
+                f"node {node.name!r} belongs to another context: an executor runs handles of its own"
+            )
+        for handle in list(self.context.handles):
+            if handle in node.entities:
+                self.add(handle)
+
     def remove(self, handle: Any) -> None:
         """Runs a handle no more; the others keep their order. Raises HandleError when it is not here."""
         handles.remove(self, handle)
@@ -178,10 +191,13 @@ class Executor(executor_.Executor):
         except KeyboardInterrupt:
             self.context.close()
 
-    def spin_some(self, timeout: float = 0.0) -> bool:
-        """Waits up to ``timeout`` seconds until something is ready and makes one pass; whether anything ran."""
-        if timeout > 0:
-            return self._drive(self._round(timeout * 1000))
+    def spin_some(self, timeout: float | None = 0.0) -> bool:
+        """Waits until something is ready and makes one pass; whether anything ran.
+
+        At most ``timeout`` seconds, None: as long as it takes.
+        """
+        if timeout is None or timeout > 0:
+            return self._drive(self._round(_patience(timeout)))
         ran = self.work(self.context.clock(), True)
         self.stopped = False
         return ran
@@ -215,9 +231,9 @@ class Executor(executor_.Executor):
         """``spin`` beside the other tasks of an asyncio program. Cancelling the task ends it."""
         await self._drive_async(self._spin())
 
-    async def spin_some_async(self, timeout: float = 0.0) -> bool:
+    async def spin_some_async(self, timeout: float | None = 0.0) -> bool:
         """``spin_some`` beside the other tasks of an asyncio program."""
-        return await self._drive_async(self._round(timeout * 1000))
+        return await self._drive_async(self._round(_patience(timeout)))
 
     async def spin_until_async(self, condition: Callable[[], object], timeout: float | None = None) -> bool:
         """``spin_until`` beside the other tasks of an asyncio program."""
@@ -258,7 +274,7 @@ class Executor(executor_.Executor):
             if not self.survives(getattr(error, "raised_by", None), error):
                 raise
         if self.let is not None:
-            return bool(self.let.work(now))
+            return bool(self.let.work(now, late))
         trigger = self.trigger
         if self.always:
             if not self._wanted(now, late):
@@ -325,7 +341,7 @@ class Executor(executor_.Executor):
         return True
 
     def _until(self, condition: Callable[[], object], timeout: float | None) -> Steps[bool]:
-        end = math.inf if timeout is None else self.context.clock() + timeout * 1000
+        end = self.context.clock() + _patience(timeout)
         while not condition():
             left = end - self.context.clock()
             if left <= 0 or not self._going():
@@ -423,6 +439,10 @@ def _milliseconds(seconds: Any, name: str = "period") -> float:
     if not isinstance(seconds, int | float) or not 0 < seconds < math.inf:
         raise WrongValueError(f"{name} is {seconds!r}: it must be a number of seconds above 0")
     return seconds * 1000
+
+
+def _patience(seconds: float | None) -> float:
+    return math.inf if seconds is None else seconds * 1000
 
 
 def _be_count(count: Any, least: int, name: str, what: str) -> None:

@@ -101,14 +101,17 @@ class Let:
         """Forgets a handle, and what it has yet to publish."""
         self._tasks.pop(handle, None)
 
-    def work(self, now: int) -> bool:
-        """A whole period at once, of what the middleware has handed on; whether anything ran."""
-        ran = self.start(now, False)
+    def work(self, now: int, due: bool = True) -> bool:
+        """A whole period at once, of what the middleware has handed on; whether anything ran.
+
+        If it is not ``due``, then only when there is news.
+        """
+        ran = self.start(now, False, due)
         self.execute()
         self.finish()
         return ran
 
-    def start(self, now: int, timed: bool = True) -> bool:
+    def start(self, now: int, timed: bool = True, due: bool = True) -> bool:
         """Starts a period at the tick ``now``: reads all inputs. Whether there is anything to call.
 
         A period that is ``timed`` ends at a time of its own: callbacks may be too late.
@@ -138,7 +141,10 @@ class Let:
                 elif not task.always:
                     continue
                 ready.append(task)
-        if not (news if executor.trigger is None else executor.trigger(executor.handles)):
+        if executor.trigger is None:
+            if not news:
+                return False
+        elif not (news or due) or not executor.trigger(executor.handles):
             return False
         for task in ready:
             if hasattr(task.handle, "take"):

@@ -29,11 +29,11 @@ def begin(executor: "Any", options: "dict[str, Any]") -> None:
         middleware = executor.context.middleware
         let = executor.let = Let(executor, executor.period, overrun, messages, Outputs(middleware))
 
-        def work(now: int) -> bool:
+        def work(now: int, due: bool = False) -> bool:
             middleware.spin_once(now)
-            return let.work(now)
+            return let.work(now, due)
 
-        executor.work = work
+        _replace(executor, work)
     elif executor.on_error is not None:
         _watch(executor)
 
@@ -63,10 +63,15 @@ def _watch(executor: "Any") -> None:
     executor.always = []
     if not hasattr(executor, "on_error"):
         executor.on_error = None
-    executor.work = lambda now: work(executor, now, False)
-    executor.beat = lambda now: work(executor, now, True)
+    _replace(executor, lambda now, due=False: work(executor, now, due))
+
+
+def _replace(executor: "Any", work: "Any") -> None:
+    """Has an executor make passes of its own; those at the end of a wait, or of periods, are due without news too."""
+    executor.work = work
+    executor.beat = lambda now: work(now, True)
     executor.round = lambda timeout: (
-        type(executor).round(executor, timeout) or work(executor, executor.context.clock(), True)
+        type(executor).round(executor, timeout) or work(executor.context.clock(), True)
     )
 
 
