@@ -137,6 +137,7 @@ def test_services_of_rmw_fastrtps_are_out_of_reach_and_that_is_said(
     asked: list[bytes] = []
     ours.replier(BASIC_TYPES, on_request=lambda identity, data: asked.append(data))
     client = rig.ask(ros, "client", node=node, name="/sum", type=TYPE)
+    assert rig.ask(ros, "matched", thing=client) == 1
     assert rig.ask(ros, "call", client=client, request={}, wait=1) == [None]
     rig.until(lambda: [f.code for f in rig.told] == ["service-dialect"])
     assert asked == []

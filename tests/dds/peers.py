@@ -49,6 +49,9 @@ CYCLONE_LO: Final = """<CycloneDDS><Domain><General><Interfaces>
 CYCLONE_LOCALHOST: Final = """<Discovery><ParticipantIndex>auto</ParticipantIndex>
 <MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer Address="127.0.0.1"/></Peers></Discovery>"""
 
+WAIT: Final = 30.0
+"""Seconds that peers wait for what a command waits for, unless told otherwise."""
+
 SPARE_TIME: Final = 20.0
 """Seconds an answer may take longer than the wait that was asked for, on a machine that is busy."""
 
@@ -124,7 +127,7 @@ class Peer:
     def do(self, command: str, **arguments: Any) -> Any:
         """Carry out a command and return its result. PeerError if it failed or took too long."""
         self.begin(command, **arguments)
-        return self.result(arguments.get("wait", 10.0) + SPARE_TIME)
+        return self.result(arguments.get("wait", WAIT) + SPARE_TIME)
 
     async def ask(self, command: str, **arguments: Any) -> Any:
         """`do` beside a running event loop."""
@@ -161,7 +164,7 @@ class Peer:
         assert self.process.stdout is not None
         return self.process.stdout.fileno()
 
-    def result(self, wait: float = SPARE_TIME) -> Any:
+    def result(self, wait: float = WAIT) -> Any:
         """The answer to the oldest command begun."""
         if not self.ready(wait):
             raise self._error(f"did not answer within {wait:.0f} s")

@@ -13,13 +13,13 @@ import pytest
 
 from muros.findings import Finding
 from muros.space import Reader, Service, Space, open_space
-from tests.dds.peers import SPARE_TIME, Peer
+from tests.dds.peers import SPARE_TIME, WAIT, Peer
 
 __all__ = ["ARRAY", "BASIC_TYPES", "STRING", "Losses", "Rig", "take_all"]
 
 STRING: Final = "std_msgs::msg::dds_::String_"
 ARRAY: Final = "std_msgs::msg::dds_::UInt8MultiArray_"
-PATIENCE: Final = 15.0
+PATIENCE: Final = 30.0
 """Seconds that anything may take on a busy machine before a test gives up."""
 
 
@@ -90,9 +90,9 @@ class Rig:
     def ask(self, peer: Peer, command: str, **arguments: Any) -> Any:
         """A peer's command while the loop runs."""
         peer.begin(command, **arguments)
-        return self.answer(peer, arguments.get("wait", 10.0))
+        return self.answer(peer, arguments.get("wait", WAIT))
 
-    def answer(self, peer: Peer, wait: float = 10.0) -> Any:
+    def answer(self, peer: Peer, wait: float = WAIT) -> Any:
         """The answer to a command begun, while the loop runs."""
         self.eventually(peer.ready, wait + SPARE_TIME)
         return peer.result(0)

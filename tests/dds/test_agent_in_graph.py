@@ -172,7 +172,7 @@ def agent(*options: str) -> Iterator[int]:
     try:
         banner = process.stdout.readline()
         port = re.search(r"udp4 127\.0\.0\.1:(\d+)", banner)
-        assert port, banner
+        assert port, banner + process.communicate(timeout=20)[0]
         yield int(port[1])
         process.send_signal(signal.SIGTERM)
         assert process.wait(20) == 0
@@ -190,11 +190,11 @@ def test_rclpy_meets_a_stock_client(name: str, peer: Fetch, domain: Domain) -> N
         client.create()
         node = ros.do("node", name="ros", domain=domain)
         assert set(NODES) <= set(ros.do("nodes", node=node, names=NODES))
-        here = ros.do("of_node", node=node, name="talker")
+        here = ros.do("of_node", node=node, name="talker", names=["/chatter", "/imu/data", "/add_two_ints"])
         assert here["publishers"]["/chatter"] == ["std_msgs/msg/String"]
         assert here["publishers"]["/imu/data"] == ["sensor_msgs/msg/Imu"]
         assert here["services"]["/add_two_ints"] == ["example_interfaces/srv/AddTwoInts"]
-        there = ros.do("of_node", node=node, name="listener", namespace="/ns")
+        there = ros.do("of_node", node=node, name="listener", namespace="/ns", names=["/chatter"])
         assert there["subscribers"]["/chatter"] == ["std_msgs/msg/String"]
         (info,) = [
             each

@@ -93,8 +93,8 @@ def test_what_they_wrote_too_long_ago_is_not_given_to_us(
     rig.matched(reader)
     rig.ask(other, "matched", thing=theirs)
     rig.ask(other, "publish", publisher=theirs, message={"data": "old"})
-    rig.until(lambda: reader.pending)
-    rig.run(0.5)
+    rig.until(lambda: reader.pending or reader.expired)
+    rig.until(lambda: reader.pending == 0)
     assert said(reader) == []
     assert reader.expired == 1
 
@@ -136,15 +136,15 @@ def test_automatic_liveliness_lasts_without_a_word(name: str, peer: Fetch, rig: 
     other = peer(name)
     node = node_of(other, domain)
     ours = rig.space(domain).participant("ours")
-    writer = ours.writer(Topic("rt/ours", STRING), Qos(depth=10, lease=500 * MS))
-    reader = ours.reader(Topic("rt/theirs", STRING), Qos(depth=10, lease=800 * MS))
-    wanted = {"depth": 10, "liveliness": "automatic", "liveliness_lease_duration": 0.8}
+    writer = ours.writer(Topic("rt/ours", STRING), Qos(depth=10, lease=1000 * MS))
+    reader = ours.reader(Topic("rt/theirs", STRING), Qos(depth=10, lease=1800 * MS))
+    wanted = {"depth": 10, "liveliness": "automatic", "liveliness_lease_duration": 1.8}
     theirs = rig.ask(other, "subscription", node=node, topic="/ours", type=TYPE, qos=wanted)
-    offered = {"depth": 10, "liveliness": "automatic", "liveliness_lease_duration": 0.5}
+    offered = {"depth": 10, "liveliness": "automatic", "liveliness_lease_duration": 1.0}
     rig.ask(other, "publisher", node=node, topic="/theirs", type=TYPE, qos=offered)
     rig.matched(writer)
     rig.matched(reader)
-    rig.run(2.0)
+    rig.run(2.5)
     assert rig.ask(other, "events", subscription=theirs, last="1 alive") == ["1 alive"]
     assert rig.told == []
 

@@ -92,7 +92,13 @@ def test_a_program_and_rclpy(program: Program, ros: Peer, dds_url: str) -> None:
     assert [m["data"] for m in ros.do("take", subscription=heard, count=5)] == [f"n{i}!" for i in range(5)]
     got = ros.do("call", client=asking, request={"data": True}, count=10)
     assert got == [{"success": True, "message": f"turn {i}"} for i in range(1, 11)]
-    found = ros.do("of_node", node=theirs, name="board", namespace="/lab/bench")
+    found = ros.do(
+        "of_node",
+        node=theirs,
+        name="board",
+        namespace="/lab/bench",
+        names=["/lab/bench/talk", "/lab/bench/light", "/horn"],
+    )
     assert found["publishers"] == {"/lab/bench/talk": [STRING]}
     assert found["services"] == {"/lab/bench/light": [SWITCH]}
     assert found["clients"] == {"/horn": [SWITCH]}

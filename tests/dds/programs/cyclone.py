@@ -26,6 +26,7 @@ from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
 LE = bytes((0, 1, 0, 0))
+WAIT = 30.0  # seconds that something may take on a machine that is busy
 LONG = 64
 CLASSES: dict[str, Any] = {}
 BASIC = struct.Struct("<?BBxfdbBhHxxiIqQ")
@@ -176,7 +177,7 @@ class Cyclone:
     def node(self, name: str, domain: int, namespace: str = "/", gid_size: int = 16) -> int:
         return self._keep(Node(name, domain, namespace, gid_size))
 
-    def told(self, node: int, count: int = 1, wait: float = 10.0) -> list[str]:
+    def told(self, node: int, count: int = 1, wait: float = WAIT) -> list[str]:
         """What others say on ros_discovery_info, hexadecimal: waits for `count`."""
         thing = self.things[node]
         qos = policies({"reliability": "reliable", "durability": "transient_local", "depth": 100})
@@ -230,7 +231,7 @@ class Cyclone:
     def subscription(self, node: int, topic: str, type: str, qos: dict[str, Any] | int = 10) -> int:
         return self._keep(Subscription(self.things[node], topic, type, qos))
 
-    def take(self, subscription: int, count: int = 1, wait: float = 10.0) -> list[Any]:
+    def take(self, subscription: int, count: int = 1, wait: float = WAIT) -> list[Any]:
         thing = self.things[subscription]
         got: list[Any] = []
 
@@ -243,7 +244,7 @@ class Cyclone:
         wait_for(enough, wait)
         return [plain(message) for message in got]
 
-    def matched(self, thing: int, count: int = 1, wait: float = 10.0) -> int:
+    def matched(self, thing: int, count: int = 1, wait: float = WAIT) -> int:
         entity = self.things[thing]
         present: Callable[[], int] = (
             entity.matched
@@ -253,7 +254,7 @@ class Cyclone:
         wait_for(lambda: present() == count, wait)
         return present()
 
-    def events(self, subscription: int, last: str, wait: float = 10.0) -> list[str]:
+    def events(self, subscription: int, last: str, wait: float = WAIT) -> list[str]:
         """What it was told, "deadline" or "1 alive": waits for `last` to be the last."""
         seen = self.things[subscription].heard.events
         wait_for(lambda: seen[-1:] == [last], wait)
@@ -262,7 +263,7 @@ class Cyclone:
     def service(self, node: int, name: str, type: str, rule: str = "{}") -> int:
         return self._keep(Caller(self.things[node], name, type, True, rule))
 
-    def serve(self, service: int, count: int = 1, wait: float = 10.0) -> int:
+    def serve(self, service: int, count: int = 1, wait: float = WAIT) -> int:
         """Answer requests until `count` were answered."""
         done = 0
 
@@ -282,7 +283,7 @@ class Cyclone:
         client: int,
         request: dict[str, Any],
         count: int = 1,
-        wait: float = 10.0,
+        wait: float = WAIT,
         number: str = "",
         window: int = 5,
     ) -> list[Any]:
@@ -306,7 +307,7 @@ class Cyclone:
         return [answers.get(number) for number in asked]
 
     def endpoints(
-        self, node: int, topic: str, publishers: int = 0, subscriptions: int = 0, wait: float = 10.0
+        self, node: int, topic: str, publishers: int = 0, subscriptions: int = 0, wait: float = WAIT
     ) -> dict[str, list[dict[str, Any]]]:
         """What discovery told of a topic's endpoints."""
         seen: dict[str, dict[str, Any]] = {"publishers": {}, "subscriptions": {}}

@@ -264,7 +264,7 @@ void pause_of(const Values& values) {
 std::string run(const Values& values) {
     const auto& command = values.at("do");
     const auto deadline = std::chrono::steady_clock::now()
-                          + std::chrono::duration<double>(std::stod(get(values, "wait", "10")));
+                          + std::chrono::duration<double>(std::stod(get(values, "wait", "30")));
     if (command == "reset") {
         reset();
         return "null";

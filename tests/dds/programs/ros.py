@@ -15,7 +15,7 @@ import threading
 import time
 import traceback
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
@@ -27,6 +27,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 
+WAIT = 30.0  # seconds that something may take on a machine that is busy
 LONG = 64  # bytes of an array that are worth writing out
 
 
@@ -130,14 +131,14 @@ class Ros:
         """A subscription, which keeps what it gets for `take`."""
         return self._keep(Subscription(self, self.things[node], find(type), topic, profile(qos)))
 
-    def take(self, subscription: int, count: int = 1, wait: float = 10.0) -> list[Any]:
+    def take(self, subscription: int, count: int = 1, wait: float = WAIT) -> list[Any]:
         """Take what has come: waits for `count` messages."""
         got = self.things[subscription].got
         self._wait(lambda: len(got) >= count, wait)
         taken, got[:] = got[:], []
         return [plain(message) for message in taken]
 
-    def matched(self, thing: int, count: int = 1, wait: float = 10.0) -> int:
+    def matched(self, thing: int, count: int = 1, wait: float = WAIT) -> int:
         """How many counterparts a publisher, subscription or client has: waits until it is `count`."""
         entity = self.things[thing]
 
@@ -153,13 +154,13 @@ class Ros:
         self._wait(lambda: present() == count, wait)
         return present()
 
-    def problems(self, thing: int, count: int = 1, wait: float = 10.0) -> list[str]:
+    def problems(self, thing: int, count: int = 1, wait: float = WAIT) -> list[str]:
         """The policies of incompatible counterparts seen: waits for `count`."""
         seen = self.things[thing].problems
         self._wait(lambda: len(seen) >= count, wait)
         return list(seen)
 
-    def events(self, subscription: int, last: str, wait: float = 10.0) -> list[str]:
+    def events(self, subscription: int, last: str, wait: float = WAIT) -> list[str]:
         """What a subscription was told of its publishers, "deadline" or "1 alive": waits for `last` to be the last."""
         seen = self.things[subscription].events
         self._wait(lambda: seen[-1:] == [last], wait)
@@ -191,7 +192,7 @@ class Ros:
         client: int,
         request: dict[str, Any],
         count: int = 1,
-        wait: float = 10.0,
+        wait: float = WAIT,
         number: str = "",
         window: int = 5,
     ) -> list[Any]:
@@ -252,7 +253,7 @@ class Ros:
         return self._keep(thing)
 
     def goal(
-        self, client: int, goal: dict[str, Any], cancel_after: int | None = None, wait: float = 15.0
+        self, client: int, goal: dict[str, Any], cancel_after: int | None = None, wait: float = WAIT
     ) -> dict[str, Any]:
         """Send a goal, see it through; `cancel_after` so many pieces of feedback."""
         thing = self.things[client]
@@ -290,7 +291,7 @@ class Ros:
 
     # The graph
 
-    def nodes(self, node: int, names: list[str] | None = None, wait: float = 10.0) -> list[str]:
+    def nodes(self, node: int, names: list[str] | None = None, wait: float = WAIT) -> list[str]:
         """Full names of all nodes, sorted: waits until all of `names` are there."""
         thing = self.things[node]
 
@@ -301,18 +302,18 @@ class Ros:
         self._wait(lambda: set(names or ()) <= set(present()), wait)
         return present()
 
-    def nodes_without(self, node: int, names: list[str], wait: float = 10.0) -> list[str]:
+    def nodes_without(self, node: int, names: list[str], wait: float = WAIT) -> list[str]:
         """Full names of all nodes: waits until none of `names` is there."""
         self._wait(lambda: not set(names) & set(self.nodes(node)), wait)
         return self.nodes(node)
 
-    def topics(self, node: int, names: list[str] | None = None, wait: float = 10.0) -> dict[str, list[str]]:
+    def topics(self, node: int, names: list[str] | None = None, wait: float = WAIT) -> dict[str, list[str]]:
         """Types by topic: waits until all of `names` are there."""
         thing = self.things[node]
         self._wait(lambda: set(names or ()) <= {name for name, _ in thing.get_topic_names_and_types()}, wait)
         return dict(thing.get_topic_names_and_types())
 
-    def services(self, node: int, names: list[str] | None = None, wait: float = 10.0) -> dict[str, list[str]]:
+    def services(self, node: int, names: list[str] | None = None, wait: float = WAIT) -> dict[str, list[str]]:
         """Types by service: waits until all of `names` are there."""
         thing = self.things[node]
         self._wait(
@@ -320,18 +321,25 @@ class Ros:
         )
         return dict(thing.get_service_names_and_types())
 
-    def of_node(self, node: int, name: str, namespace: str = "/") -> dict[str, dict[str, list[str]]]:
-        """What a node publishes, subscribes, serves and calls."""
+    def of_node(
+        self, node: int, name: str, namespace: str = "/", names: Sequence[str] = (), wait: float = WAIT
+    ) -> dict[str, dict[str, list[str]]]:
+        """What a node publishes, subscribes, serves and calls: waits until all of `names` are among it."""
         thing = self.things[node]
-        return {
-            "publishers": dict(thing.get_publisher_names_and_types_by_node(name, namespace)),
-            "subscribers": dict(thing.get_subscriber_names_and_types_by_node(name, namespace)),
-            "services": dict(thing.get_service_names_and_types_by_node(name, namespace)),
-            "clients": dict(thing.get_client_names_and_types_by_node(name, namespace)),
-        }
+
+        def present() -> dict[str, dict[str, list[str]]]:
+            return {
+                "publishers": dict(thing.get_publisher_names_and_types_by_node(name, namespace)),
+                "subscribers": dict(thing.get_subscriber_names_and_types_by_node(name, namespace)),
+                "services": dict(thing.get_service_names_and_types_by_node(name, namespace)),
+                "clients": dict(thing.get_client_names_and_types_by_node(name, namespace)),
+            }
+
+        self._wait(lambda: set(names) <= {each for kind in present().values() for each in kind}, wait)
+        return present()
 
     def endpoints(
-        self, node: int, topic: str, publishers: int = 0, subscriptions: int = 0, wait: float = 10.0
+        self, node: int, topic: str, publishers: int = 0, subscriptions: int = 0, wait: float = WAIT
     ) -> dict[str, list[dict[str, Any]]]:
         """Endpoint info of a topic, as `ros2 topic info -v`: waits for so many."""
         thing = self.things[node]
@@ -356,7 +364,7 @@ class Ros:
             for side, infos in zip(("publishers", "subscriptions"), found, strict=True)
         }
 
-    def without_publishers(self, node: int, topic: str, wait: float = 10.0) -> list[str]:
+    def without_publishers(self, node: int, topic: str, wait: float = WAIT) -> list[str]:
         """The nodes that publish a topic: waits until there is none."""
         thing = self.things[node]
         self._wait(lambda: not thing.get_publishers_info_by_topic(topic), wait)
