@@ -9,7 +9,8 @@ and executors have no locks, and are the same whether there is one thread or man
   paid for in time and priority, by the thread that wants it. Each thread has a seat with a bell; mail rings it. What
   the executor takes for its middleware is in truth ``Sharing``: its ``spin_once`` hands the mail of this thread's seat
   to the handles, its ``wait`` sleeps until the bell rings. A mailbox holds as much as the handle's queue; what
-  overflows is counted in the handle's ``lost``.
+  overflows is counted in the handle's ``lost``. A subscription is given the next message when it has processed the
+  last, so that there is one queue and not two.
 - *What is published* goes straight into the session or the space, which have a lock of their own.
 - *Calls.* A request that is sent, or an answer that is given, in another thread than that of the handle is handed over
   and made there (``call_in``).
@@ -83,6 +84,7 @@ class Seat:
         self.ending = False
         """Whether its thread is to leave its executor."""
         self._due: deque[Mailbox] = deque()
+        self._held: deque[Mailbox] = deque()  # their handles have yet to take what they were given
         self._calls: deque[Callable[[], object]] = deque()
 
     @property
@@ -95,6 +97,10 @@ class Seat:
         self._due.append(mailbox)
         self.bell.ring()
 
+    def hold(self, mailbox: Mailbox) -> None:
+        """A mailbox has more than its handle takes now; for this thread alone."""
+        self._held.append(mailbox)
+
     def call(self, function: Callable[[], object]) -> None:
         """Has the thread call a function."""
         self._calls.append(function)
@@ -106,10 +112,11 @@ class Seat:
         for _ in range(len(self._calls)):
             done += 1
             self._calls.popleft()()
-        for _ in range(len(self._due)):
-            mailbox = self._due.popleft()
-            if mailbox.seat is self:
-                done += mailbox.hand_on()
+        for boxes in (self._held, self._due):
+            for _ in range(len(boxes)):
+                mailbox = boxes.popleft()
+                if mailbox.seat is self:
+                    done += mailbox.hand_on()
         return done
 
 
@@ -163,8 +170,12 @@ class Mailbox:
                 self._handle.lost += lost - self._told
             self._told = lost
         count = 0
+        full = False
         try:
             for _ in range(len(self._mail)):
+                full = self._is_full()
+                if full:
+                    break
                 try:
                     item = self._mail.popleft()
                 except IndexError:
@@ -172,10 +183,26 @@ class Mailbox:
                 count += 1
                 self.take(*item)
         finally:
-            if self._mail and not self._announced:
+            if full:
+                self.seat.hold(self)
+            elif self._mail and not self._announced:
                 self._announced = True
                 self.seat.announce(self)
         return count
+
+    def _is_full(self) -> bool:
+        """Whether a subscription has yet to process what it was given: then more would be out of date before it is.
+
+        With a trigger the subscription's own queue decides what is dropped, and one without a callback is asked for
+        all that there is.
+        """
+        handle = self._handle
+        return (
+            not self._newest
+            and getattr(handle, "eager", False)
+            and getattr(handle, "callback", None) is not None
+            and handle.ready(0)
+        )
 
 
 class Sharing:
@@ -355,7 +382,7 @@ class Sharing:
                 return 0
         if seat.ending:
             raise Ended
-        return seat.hand_on() if seat.waiting else 0
+        return seat.hand_on()
 
     def wait(self, timeout: float, /) -> None:
         """Waits until something has come for this thread, at most ``timeout`` ms."""
