@@ -7,14 +7,12 @@ prints
     2026-11-22, within 180 us
 """
 
-import sys
-
 from way import way
 
 from muros.client import Session, TimeSync
 from muros.rclc import Context, Executor
 
-session = Session(way(sys.argv[1]))
+session = Session(way())
 context = Context(session)
 node = context.node("epoch_sync")
 clock = TimeSync(session)

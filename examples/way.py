@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 
 def open_context(**options: "Any") -> "Context":
     """A context on the way that the command line names; ``options`` are those of the session with an agent, if any."""
-    if len(sys.argv) < 2 or ":" not in sys.argv[1]:
-        print("usage:", sys.argv[0], "dds:|local:|udp:HOST:PORT|tcp:HOST:PORT|serial:DEVICE:BAUD")
-        sys.exit(2)
-    found = way(sys.argv[1])
+    found = way()
     if options and not isinstance(found, str):
         from muros.client import Session
 
@@ -28,19 +25,36 @@ def open_context(**options: "Any") -> "Context":
     return Context(found)
 
 
-def way(text: str) -> "Any":
-    """The transport, or the URL, that a text names; a board imports only the one it uses."""
+def way() -> "Any":
+    """The transport or the URL that the command line names; ends the program where it names none.
+
+    Imported here, so that a board loads only what it uses.
+    """
+    text = sys.argv[1] if len(sys.argv) > 1 else ""
     words = text.split(":")
-    if len(words) < 3:
+    kind = words[0]
+    if (
+        len(words) == 2
+        and kind in ("dds", "local", "cyclonedds")
+        and sys.implementation.name != "micropython"
+    ):
         return text
-    if words[0] == "udp":
-        from muros.client import Udp
+    if len(words) == 3 and words[2].isdigit():
+        if kind == "udp":
+            from muros.client import Udp
 
-        return Udp(words[1], int(words[2]))
-    if words[0] == "tcp":
-        from muros.client import Tcp
+            return Udp(words[1], int(words[2]))
+        if kind == "tcp":
+            from muros.client import Tcp
 
-        return Tcp(words[1], int(words[2]))
-    from muros.client import Serial
+            return Tcp(words[1], int(words[2]))
+        if kind == "serial":
+            from muros.client import Serial
 
-    return Serial(words[1], int(words[2]))
+            return Serial(words[1], int(words[2]))
+    print(
+        "usage:",
+        sys.argv[0],
+        "udp:HOST:PORT|tcp:HOST:PORT|serial:DEVICE:BAUD, on computers dds:[DOMAIN]|local:",
+    )
+    sys.exit(2)

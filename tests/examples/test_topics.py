@@ -140,10 +140,23 @@ def test_bounds_of_what_messages_take(stage: Stage, place: str, on: str) -> None
     assert program.lines[:2] == [heard, refused]
 
 
-def test_without_a_way_it_says_how_it_is_used(stage: Stage) -> None:
-    program = stage.start("hello_world")
+@pytest.mark.parametrize("on", ["python", "micropython"])
+@pytest.mark.parametrize("words", [[], ["udp"], ["udp:127.0.0.1:x"], ["smoke:1:2"]])
+def test_a_way_that_is_none(stage: Stage, on: str, words: list[str]) -> None:
+    if on == "micropython":
+        require("unix")
+    program = stage.start("hello_world", *words, on=on)
     assert program.process.wait(30) == 2
     stage.programs.clear()
     program.kill()
     assert program.lines[0].startswith("usage: ")
-    assert program.lines[0].endswith(" dds:|local:|udp:HOST:PORT|tcp:HOST:PORT|serial:DEVICE:BAUD")
+    assert len(program.lines) == 1
+
+
+def test_a_board_has_no_space_of_its_own(stage: Stage) -> None:
+    require("unix")
+    program = stage.start("hello_world", "local:", on="micropython")
+    assert program.process.wait(30) == 2
+    stage.programs.clear()
+    program.kill()
+    assert program.lines[0].startswith("usage: ")
