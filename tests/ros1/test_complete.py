@@ -134,12 +134,23 @@ def command(master: Master, *words: str) -> str:
     return done.stdout
 
 
+def meet(ros: Peer, heard: int, says: int) -> None:
+    """Waits until what rospy says comes back from the board; its own counts of connections come too early."""
+    assert ros.do("wait_for_publishers", subscriber=heard) == 1
+    assert ros.do("wait_for_subscribers", publisher=says) == 1
+    end = time.monotonic() + LIMIT
+    while not ros.do("count", subscriber=heard, wait=0.2):
+        ros.do("publish", publisher=says, message={"data": "anybody?"})
+        assert time.monotonic() < end
+    while ros.do("take", subscriber=heard, wait=0.3):
+        pass
+
+
 def test_rospy_and_a_board(master: Master, ros: Peer) -> None:
     with serving(master, "--space", "none") as (process, port), Board(port) as board:
         heard = ros.do("subscriber", topic="/b/str", type="std_msgs/String")
         says = ros.do("publisher", topic="/h/str", type="std_msgs/String")
-        assert ros.do("wait_for_publishers", subscriber=heard) == 1
-        assert ros.do("wait_for_subscribers", publisher=says) == 1
+        meet(ros, heard, says)
         for number in range(5):
             ros.do("publish", publisher=says, message={"data": f"hello {number}"})
             assert ros.do("take", subscriber=heard) == [{"data": f"echo hello {number}"}]
@@ -226,8 +237,8 @@ def test_both_graphs_at_once(master: Master, ros: Peer) -> None:
     with serving(master, "--space", "local:") as (_, port), Board(port) as board:
         heard = ros.do("subscriber", topic="/b/str", type="std_msgs/String")
         says = ros.do("publisher", topic="/h/str", type="std_msgs/String")
-        ros.do("wait_for_publishers", subscriber=heard)
-        ros.do("wait_for_subscribers", publisher=says)
+        meet(ros, heard, says)
+        board.heard.clear()
         ros.do("publish", publisher=says, message={"data": "x"})
         assert ros.do("take", subscriber=heard) == [{"data": "echo x"}]
         assert board.heard == ["x"]
@@ -254,8 +265,14 @@ def test_micropython_rosserial(master: Master, ros: Peer) -> None:
             assert board.stdin is not None
             assert board.stdout is not None
             assert board.stdout.readline() == "ready\n"
-            assert ros.do("wait_for_publishers", subscriber=heard) == 1
             assert ros.do("wait_for_subscribers", publisher=says) == 1
+            end = time.monotonic() + LIMIT
+            while not ros.do("count", subscriber=heard, wait=0.2):
+                board.stdin.write("anybody?\n")
+                board.stdin.flush()
+                assert time.monotonic() < end
+            while ros.do("take", subscriber=heard, wait=0.3):
+                pass
             for number in range(3):
                 board.stdin.write(f"hello {number}\n")
                 board.stdin.flush()

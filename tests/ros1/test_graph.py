@@ -69,7 +69,7 @@ def test_topics_both_ways(master: Master, ros: Peer) -> None:
             says = await ros.ask("publisher", topic="/down", type="std_msgs/String")
             assert await ros.ask("wait_for_publishers", subscriber=heard) == 1
             assert await ros.ask("wait_for_subscribers", publisher=says) == 1
-            await until(lambda: down.connected)
+            await until(lambda: down.connected and up.subscribers)
             for number in range(100):
                 up.publish(text(f"up {number}"))
             taken = await ros.ask("take", subscriber=heard, count=100)

@@ -78,7 +78,7 @@ def test_a_board_is_a_node(master: Master, ros: Peer) -> None:
             assert (up.size, up.least_size, up.drift) == (None, 4, "")
             heard = await ros.ask("subscriber", topic="/chatter", type="std_msgs/String")
             says = await ros.ask("publisher", topic="/serial_node/led", type="std_msgs/String")
-            await ros.ask("wait_for_publishers", subscriber=heard)
+            await until(lambda: up._publication.subscribers)
             await ros.ask("wait_for_subscribers", publisher=says)
             up.publish(text("from a board"))
             assert await ros.ask("take", subscriber=heard) == [{"data": "from a board"}]
@@ -156,8 +156,7 @@ def test_parameters_logs_and_diagnostics(master: Master, ros: Peer) -> None:
             await until(lambda: node.parameter("~pid/p") == 2.5)
             assert node.parameter("no name!") is None
             rosout = await ros.ask("subscriber", topic="/rosout", type="rosgraph_msgs/Log")
-            while await ros.ask("wait_for_publishers", subscriber=rosout, count=2) < 2:
-                pass
+            await until(lambda: node._rosout.subscribers)
             node.log(2, "battery is low")
             logs = await ros.ask("take", subscriber=rosout)
             assert [(each["level"], each["name"], each["msg"]) for each in logs] == [
@@ -182,7 +181,7 @@ def test_old_definitions_meet_todays_nodes(master: Master, ros: Peer) -> None:
             up = node.publisher("battery", "sensor_msgs/BatteryState", OLD_BATTERY)
             assert "without temperature" in up.drift
             heard = await ros.ask("subscriber", topic="/battery", type="sensor_msgs/BatteryState")
-            await ros.ask("wait_for_publishers", subscriber=heard)
+            await until(lambda: up._publication.subscribers)
             up.publish(old.to_ros1(state, 7))
             (got,) = await ros.ask("take", subscriber=heard)
             assert (got["voltage"], got["location"], got["header"]["seq"]) == (12.5, "slot", 7)
