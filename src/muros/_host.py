@@ -80,31 +80,33 @@ def copy(target: bytearray, at: int, source: bytes | bytearray | memoryview, sta
     target[at : at + n] = source[start : start + n]
 
 
-def names(places: str, package: str) -> list[str]:
+def names(places: dict[str, str], package: str) -> list[str]:
     """All public names of a package, by what ``exports`` says."""
     found = {"Qos"}
-    for line in places.strip().split("\n"):
-        words = line.split()
-        if words and words[0].strip("*").split(".")[0] == package:
-            found.update(words[1:])
+    for line in places[package].split("\n"):
+        found.update(line.split()[1:])
     return sorted(found - {"Uart"})
 
 
-HOSTS = """
-client.hosts Session
-rclc.action_hosts ActionClient ActionServer
-rclc.host_entities Client Publisher Service
-rclc.host_events Event
-rclc.host_executor Executor
-rclc.host_handles GuardCondition Subscription Timer
-rclc.hosts Context Node
-rclc.groups BEST_EFFORT CallbackGroup REAL_TIME_CRITICAL RealTimeClass SOFT_REAL_TIME ThreadError Threads
-rclc.sense_plan_act SensePlanAct
-rclc.workers Workers
-rclc.host_clock Clock
-rclc.host_graph Endpoint Graph
-rclc.host_parameters Parameters
-rclc.parameter_files ParameterClient
-rclc.remapping ArgumentsError RosArguments remove_ros_arguments
-"""
+HOSTS = {
+    "client": """
+hosts Session
+""",
+    "rclc": """
+action_hosts ActionClient ActionServer
+host_entities Client Publisher Service
+host_events Event
+host_executor Executor
+host_handles GuardCondition Subscription Timer
+hosts Context Node
+groups BEST_EFFORT CallbackGroup REAL_TIME_CRITICAL RealTimeClass SOFT_REAL_TIME ThreadError Threads
+sense_plan_act SensePlanAct
+workers Workers
+host_clock Clock
+host_graph Endpoint Graph
+host_parameters Parameters
+parameter_files ParameterClient
+remapping ArgumentsError RosArguments remove_ros_arguments
+""",
+}
 """Where public names are that only hosts have, or hosts have of their own; see ``exports``."""

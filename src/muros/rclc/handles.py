@@ -1,6 +1,6 @@
 """What programs ask of executors and of what they run now and then. Boards borrow this."""
 
-from muros.compat import MPY, borrow, const, ticks_add, ticks_diff
+from muros.compat import borrow, const, ticks_add, ticks_diff
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -85,9 +85,9 @@ def spin_one_period(self: "Executor", period: float = 0) -> None:
 
 def destroy(self: "Handle") -> None:
     """Takes a handle away, with all that waits."""
-    handles = self.handles or self.context.handles
-    if self in handles:
-        handles.remove(self)
+    for place in (self.handles or self.context.handles, getattr(self, "home", [])):
+        if self in place:
+            place.remove(self)
     if self.entity is not None:
         self.entity.destroy()
     self.cancelled = True  # a timer
@@ -95,8 +95,6 @@ def destroy(self: "Handle") -> None:
     for name in ("_waiting", "_answers", "_asked"):
         if hasattr(self, name):
             getattr(self, name).clear()
-    if not MPY and self in self.__dict__.get("home", ()):
-        self.home.remove(self)
 
 
 def exchange_period(self: "Timer", period: float) -> float:
