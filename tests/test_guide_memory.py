@@ -14,7 +14,7 @@ from muros.client import Session, Udp
 from muros.diagnostics import Bridge, read_table_untrusted
 from muros.interfaces import message
 from muros.rclc import Context, Executor
-from tests.test_guides import ROOT, Bench, bench, programs
+from tests.test_guides import PATIENCE, ROOT, Bench, bench, programs
 
 from sensor_msgs.msg import Image, JointState
 from std_msgs.msg import String
@@ -58,6 +58,7 @@ def test_what_the_command_says(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_text_in_its_place(bench: Bench) -> None:
     got: list[str] = []
     bench.node.subscription(String, "status", lambda message: got.append(message.data))
+    assert bench.context.wait_connected(PATIENCE)
     running = bench.start(MEMORY, 1)
     bench.until(lambda: len(got) >= 2)
     assert set(got) == {"running, 21.5 degrees"}
@@ -69,6 +70,7 @@ def test_an_image_in_pieces(bench: Bench) -> None:
     context = Context(Session(Udp("127.0.0.1", bench.link.port), largest=300_000))
     context.node("screen").subscription(Image, "image", came.append)
     executor = Executor(context)
+    assert context.wait_connected(PATIENCE)
     running = bench.start(LARGE, 0)
     try:
         bench.until(lambda: came and running.lines, lambda: executor.spin_some())
@@ -87,7 +89,8 @@ def test_diagnostics(bench: Bench, tmp_path: Path) -> None:
     array = message("diagnostic_msgs/msg/DiagnosticArray")
     listened: list[Any] = []
     bench.node.subscription(array, "/diagnostics", listened.append)
-    bench.until(lambda: bridge.state == "CONNECTED", lambda: executor.spin_some())
+    assert bridge.wait_connected(PATIENCE)
+    assert bench.context.wait_connected(PATIENCE)
     running = bench.start(DIAGNOSTICS, 0)
     try:
         bench.until(lambda: len(heard) == 2 and len(listened) == 2, lambda: executor.spin_some())

@@ -7,7 +7,7 @@ from muros.diagnostics import Bridge, read_table_untrusted
 from muros.interfaces import board, message
 from tests.diagnostics.test_bridge import TABLE, pairs
 from tests.micropython.test_lifecycle import Board, stage
-from tests.rclc_space.ways import Stage
+from tests.rclc_space.ways import PATIENCE, Stage
 
 __all__ = ["stage"]
 
@@ -68,7 +68,7 @@ def test_diagnostics_of_a_board(stage: Stage, tmp_path: Path) -> None:
     node.subscription(ARRAY, "diagnostics", lambda array: heard.extend(array.status))
     force = node.publisher(message("std_msgs/msg/Empty"), "diagnostics_uros/force_update")
     Bridge(stage.node("bridge"), read_table_untrusted(TABLE))
-    stage.until(lambda: all(context.state == "CONNECTED" for context in stage.contexts))
+    assert all(context.wait_connected(PATIENCE) for context in stage.contexts)
     board.generate(TYPES, tmp_path, constants=())
     running = Board(PROGRAM, way.link.port, tmp_path)
     stage.until(lambda: len(heard) == 3)

@@ -11,7 +11,7 @@ from tests.micropython.runtimes import require
 from tests.micropython.test_lifecycle import stage
 from tests.micropython.tree import board_tree, compiled, write
 from tests.micropython.unix import run_mpy
-from tests.rclc_space.ways import Stage
+from tests.rclc_space.ways import PATIENCE, Stage
 
 from sensor_msgs.msg import Image
 
@@ -59,7 +59,7 @@ def test_an_image_larger_than_the_heap(stage: Stage, tmp_path: Path) -> None:
     stage.contexts.append(context)
     stage.executors.append(Executor(context))
     context.node("screen").subscription(Image, "image", came.append)
-    stage.until(lambda: stage.contexts[0].state == "CONNECTED")
+    assert context.wait_connected(PATIENCE)
     files = board_tree() | {
         path: text.encode() for path, text in board.sources(["sensor_msgs/msg/Image"]).items()
     }
@@ -71,8 +71,9 @@ def test_an_image_larger_than_the_heap(stage: Stage, tmp_path: Path) -> None:
 
     thread = threading.Thread(target=run, daemon=True)
     thread.start()
-    stage.until(lambda: came)
+    stage.until(lambda: came or not thread.is_alive())
     thread.join()
+    stage.until(lambda: came)
     assert output == ["[True] []\n"]
     assert (came[0].height, came[0].width, came[0].encoding) == (400, 500, "mono8")
     assert bytes(came[0].data) == bytes(range(256)) * 781 + bytes(range(64))

@@ -91,7 +91,7 @@ class Stage:
 
     def meet(self, *entities: Any) -> None:
         """Spins until everybody is connected, and each publisher or client has met somebody."""
-        self.until(lambda: all(context.state == "CONNECTED" for context in self.contexts))
+        self.until(lambda: all(_ready(context) for context in self.contexts))
         if self.way.direct:
             self.until(lambda: all(_met(entity) for entity in entities))
 
@@ -100,6 +100,11 @@ class Stage:
         for context in self.contexts:
             context.close()
         self.way.close()
+
+
+def _ready(context: Context) -> bool:
+    """Whether everything that was made on a context is there."""
+    return context.state == "CONNECTED" and not getattr(context.middleware, "pending", 0)
 
 
 def _met(entity: Any) -> bool:
