@@ -82,6 +82,9 @@ class Ros1World:
             await self._own.close()
             raise Ros1Error(f"no ROS 1 master: {error}. Start it (roscore), or set ROS_MASTER_URI") from None
         self._follow_clock()
+        await asyncio.to_thread(
+            interfaces.converter, "std_msgs/String"
+        )  # definitions are read once, not for a board
 
     async def close(self) -> None:
         """Takes what is left out of the graph."""
