@@ -386,6 +386,18 @@ def test_r18_reply_expired(stage: Stage) -> None:
     assert replies == [None, None], "who asked has given up before the reply came"
 
 
+def test_what_is_fresh_is_delivered_and_answered(stage: Stage) -> None:
+    Pair(stage).round_trip(Qos(lifespan=LONG))
+    service: Any = stage.node("server").service(AddTwoInts, "add", answer, Qos(lifespan=LONG))
+    client = stage.node("client").client(AddTwoInts, "add")
+    stage.meet(client)
+    sums: list[int] = []
+    for n in range(3):
+        stage.until(partial(client.send, AddTwoInts.Request(a=n), lambda reply: sums.append(reply.sum)))
+    stage.until(lambda: len(sums) == 3)
+    assert (sorted(sums), service.expired) == ([0, 1, 2], 0)
+
+
 def test_r19_init_and_shutdown_again(stage: Stage) -> None:
     for _ in range(5):
         context = stage.way.open()
