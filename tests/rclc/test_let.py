@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+import muros.rclc
 from muros.rclc import (
     ALWAYS,
     CANCEL_CURRENT,
@@ -32,6 +33,7 @@ from tests.client.world import World
 from tests.rclc.test_rclc import Board
 from tests.rclc.virtual import WAYS, Bench, InSpace
 
+from example_interfaces.action import Fibonacci
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32
 
@@ -278,6 +280,45 @@ def test_a_deterministic_executor_as_the_guide_has_it(local: InSpace) -> None:
         control.spin_one_period()
     assert ticks == [20, 40, 60]
     assert got == [(20, 0), (40, 1), (60, 2)]
+
+
+AS_WRITTEN = """
+sense = Executor(context, trigger=all_of(laser, imu))
+sense.add(laser, on_laser)              # order of adding = order of processing
+sense.add(imu, on_imu, when=ALWAYS)     # called with None when there is no new data
+sense.spin_some()
+
+control = Executor(context, semantics=LET, period=0.010, trigger=one(timer))
+control.add(timer)
+control.add(laser, avoid)
+control.spin_period()                   # inputs at the start of each period, outputs at its end
+"""
+
+
+def test_a_deterministic_executor_runs_as_it_was_planned(local: InSpace) -> None:
+    """The plan that was written before the code. A handle that is added to a second executor moves there."""
+    node, talker = local.context.node("node"), local.talker.node("talker")
+    said: list[tuple[str, int | None]] = []
+    names: dict[str, Any] = {
+        "context": local.context,
+        "laser": node.subscription(Int32, "laser", None),
+        "imu": node.subscription(Int32, "imu", None),
+        "timer": node.timer(0.01, lambda: said.append(("timer", None))),
+        "on_laser": lambda message: said.append(("laser", message.data)),
+        "on_imu": lambda message: said.append(("imu", message and message.data)),
+        **{name: getattr(muros.rclc, name) for name in ("ALWAYS", "LET", "Executor", "all_of", "one")},
+    }
+
+    def avoid(message: Any) -> None:
+        said.append(("avoid", message.data))
+        names["control"].stop()
+
+    names["avoid"] = avoid
+    publishers = {name: talker.publisher(Int32, name) for name in ("laser", "imu")}
+    for value, name in ((1, "laser"), (2, "imu"), (3, "laser")):
+        publishers[name].publish(Int32(data=value))
+    exec(AS_WRITTEN, names)
+    assert said == [("laser", 1), ("imu", 2), ("timer", None), ("avoid", 3)]
 
 
 def test_always_with_let(local: InSpace) -> None:
@@ -805,3 +846,40 @@ def test_the_same_network_gives_the_same_callbacks() -> None:
         assert first == again, f"seed {seed}"
         calls += len(first[0])
     assert calls > 300
+
+
+def test_actions_run_with_let(local: InSpace) -> None:
+    """Goals, feedback and results cross at the ends of periods, as everything does."""
+    node, other = local.context.node("node"), local.talker.node("other")
+
+    def run(goal: Any) -> Any:
+        sequence = [0, 1]
+        for _ in range(goal.request.order - 1):
+            sequence.append(sequence[-1] + sequence[-2])
+            goal.feedback(Fibonacci.Feedback(sequence=sequence))
+            yield
+        return Fibonacci.Result(sequence=sequence)
+
+    server = node.action_server(Fibonacci, "fibonacci", on_execute=run)
+    client = other.action_client(Fibonacci, "fibonacci")
+    executor = local.executor(semantics=LET, period=0.01)
+    executor.add(server)
+    others = Executor(local.talker)
+    told: list[tuple[int, str, int]] = []
+    start = local.now
+    client.send_goal(
+        Fibonacci.Goal(order=4),
+        on_response=lambda goal, accepted: told.append((local.now - start, "accepted", 0)),
+        on_feedback=lambda goal, feedback: told.append(
+            (local.now - start, "feedback", len(feedback.sequence))
+        ),
+        on_result=lambda goal, result: told.append((local.now - start, "result", result.sequence[-1])),
+    )
+    for _ in range(12):
+        executor.spin_one_period()
+        for _ in range(5):
+            others.spin_some(0.0)
+    assert [what[1:] for what in told] == [
+        ("accepted", 0), ("feedback", 3), ("feedback", 4), ("feedback", 5), ("result", 3),
+    ]  # fmt: skip
+    assert {at % PERIOD for at, _, _ in told} == {0}
