@@ -24,6 +24,8 @@ TYPES = (
     "std_msgs/msg/Int32",
     "std_msgs/msg/String",
     "std_msgs/msg/UInt8MultiArray",
+    "std_msgs/msg/Empty",
+    "micro_ros_diagnostic_msgs/msg/MicroROSDiagnosticStatus",
     "sensor_msgs/msg/JointState",
     "example_interfaces/srv/AddTwoInts",
     "rcl_interfaces/srv/GetParameters",
