@@ -12,10 +12,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from importlib import import_module
-from pathlib import Path
-from typing import Any, Final
+from types import MappingProxyType
+from typing import Any, Final, NamedTuple
 
 from muros.client.names import resolve
 from muros.rclc.errors import RclError
@@ -45,8 +44,7 @@ class ArgumentsError(ValueError):
         self.code = code
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
+class Rule(NamedTuple):
     """A rule: what is called ``match`` is called ``to`` instead.
 
     ``kind`` is "name" or "namespace" (of the node), "topic", "service", or "" for both of the latter. ``node`` is the
@@ -59,14 +57,13 @@ class Rule:
     node: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class RosArguments:
+class RosArguments(NamedTuple):
     """What stands behind ``--ros-args``. ``others`` is all that does not."""
 
     rules: tuple[Rule, ...] = ()
     values: tuple[tuple[str, Mapping[str, Any]], ...] = ()
     """Parameters, each with a pattern of the nodes they are for."""
-    levels: Mapping[str, int] = field(default_factory=dict)
+    levels: Mapping[str, int] = MappingProxyType({})
     """Levels of loggers by name, "" for those that are not named."""
     enclave: str = ""
     rosout: bool = True
@@ -280,7 +277,8 @@ def _file(name: str) -> list[tuple[str, Mapping[str, Any]]]:
     """What a file says, node by node; what names a node exactly comes last."""
     files = import_module("muros.rclc.parameter_files")
     try:
-        text = Path(name).read_text(encoding="utf-8")
+        with open(name, encoding="utf-8") as file:
+            text = file.read()
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is no text"
         raise ArgumentsError(f"--params-file {name}: {why}") from None
