@@ -34,6 +34,7 @@ class Tap(Link):
         """Opens the link inside; its events come through here."""
         if self.on_peer is not None:
             self.inner.on_peer = self.on_peer
+            self.inner.on_room = self.on_room
         self.inner.open(_Listener(self, events, self._on_message))
 
     def close(self) -> None:

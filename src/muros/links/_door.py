@@ -107,6 +107,8 @@ class Link(ABC):
         self.counters = LinkCounters()
         self.on_peer: Callable[[Address], object] | None = None
         """Called when somebody can be reached who has said nothing yet: a port was opened, a connection came."""
+        self.on_room: Callable[[Address], object] | None = None
+        """Called when what waited for a peer in the link's own queue has left, see `backlog`."""
         self._events: LinkEvents | None = None
 
     @property
@@ -197,6 +199,15 @@ class Link(ABC):
             return
         try:
             self.on_peer(address)
+        except Exception as error:
+            self._owner_failed(error)
+
+    def _room(self, address: Address) -> None:
+        """A peer's queue is empty: told only to who asked for it."""
+        if self.on_room is None or self._events is None:
+            return
+        try:
+            self.on_room(address)
         except Exception as error:
             self._owner_failed(error)
 

@@ -90,6 +90,10 @@ class LineLink(Link):
             port.garbage = 0
             self._problem(Cause("line-garbage", why, self._noise_remedy()), what)
 
+    def _drained(self, port: Port) -> None:
+        for address in list(port.addresses.values()):
+            self._room(address)
+
     def _ended(self, port: Port, reason: str) -> None:
         """The port has ended by itself."""
         del self._ports[port.device]
@@ -116,6 +120,7 @@ class Port:
             partial(link._messages, self),
             partial(link._damaged, self),
             partial(link._ended, self),
+            on_room=partial(link._drained, self),
         )
 
     def shut(self) -> None:

@@ -21,8 +21,8 @@ class ByteStream:
     """Reads and writes a non-blocking descriptor.
 
     ``on_bytes(data)`` gets what comes; ``on_end(reason)`` is called once when the stream has ended, never from
-    within `write`. ``queue_bytes`` bounds what waits for a slow far end, yet an empty queue takes a frame of any
-    size.
+    within `write`; ``on_room()`` when what was queued has left. ``queue_bytes`` bounds what waits for a slow far end,
+    yet an empty queue takes a frame of any size.
     """
 
     def __init__(
@@ -32,8 +32,10 @@ class ByteStream:
         on_bytes: Callable[[bytes], None],
         on_end: Callable[[str], None],
         read_bytes: int = READ_BYTES,
+        on_room: Callable[[], None] | None = None,
     ) -> None:
         self._fd = fd
+        self._on_room = on_room
         self._read_bytes = read_bytes
         self._limit = queue_bytes
         self._on_bytes = on_bytes
@@ -103,6 +105,8 @@ class ByteStream:
         del queue[:done]
         if not queue:
             self._loop.remove_writer(self._fd)
+            if self._on_room is not None:
+                self._on_room()
 
     def _end(self, reason: str) -> None:
         if self._running:
@@ -114,7 +118,8 @@ class Channel:
     """A byte stream that carries messages.
 
     ``on_messages`` gets each batch of (message, peer number), ``on_damage`` the kinds and numbers of framing errors
-    that a read has shown, ``on_end`` the reason why the stream has ended.
+    that a read has shown, ``on_end`` the reason why the stream has ended; ``on_room`` is called when what was queued
+    has left.
     """
 
     def __init__(
@@ -126,12 +131,13 @@ class Channel:
         on_damage: Callable[[dict[str, int]], None],
         on_end: Callable[[str], None],
         read_bytes: int = READ_BYTES,
+        on_room: Callable[[], None] | None = None,
     ) -> None:
         self._framing = framing
         self._cutter = Cutter(framing)
         self._on_messages = on_messages
         self._on_damage = on_damage
-        self._stream = ByteStream(fd, queue_bytes, self._take, on_end, read_bytes)
+        self._stream = ByteStream(fd, queue_bytes, self._take, on_end, read_bytes, on_room)
 
     @property
     def queued(self) -> int:

@@ -197,6 +197,7 @@ class _Connection:
             partial(link._damaged, self),
             partial(link._ended, self),
             link._read_bytes,
+            partial(link._room, address),
         )
 
 

@@ -55,6 +55,12 @@ class Port:
         if board is not None:
             board.receive(data, now)
 
+    def room(self, address: Hashable, now: int) -> None:
+        """The link has room again for ``address``."""
+        board = self.boards.get(address)
+        if board is not None:
+            board.pump(now)
+
     def down(self, address: Hashable, reason: str, now: int) -> None:
         """Nobody can be reached at ``address`` any more."""
         board = self.boards.pop(address, None)

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 __all__ = ["Link", "Output", "Source"]
 
-_POLL = 2
-"""When to look again at a line that takes nothing now, in ms."""
+_POLL = 20
+"""When to look again at a line that takes nothing now, in ms; the link says it earlier if it can."""
 _BATCH = 2048
 """Bytes that are handed over at once, so that many small frames cost one call of the system."""
 

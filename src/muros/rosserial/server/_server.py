@@ -122,6 +122,7 @@ class Server:
             self._finding_baud.add(link)
         adapter = _LinkAdapter(self, link, name)
         link.on_peer = adapter.on_peer
+        link.on_room = adapter.on_room
         if self._loop is not None:
             link.open(adapter)
         self.links.append(link)
@@ -293,6 +294,10 @@ class _LinkAdapter:
     def on_peer(self, address: Hashable) -> None:
         """Somebody can be spoken to."""
         self.port.up(address, _now())
+
+    def on_room(self, address: Hashable) -> None:
+        """What waited for a peer has left."""
+        self.port.room(address, _now())
 
     def on_message(self, link: Link, data: bytes, address: Hashable) -> None:
         """Bytes came."""

@@ -37,7 +37,7 @@ _LATCHED = frozenset({"/tf_static"})
 _LEVELS = (10, 20, 30, 40, 50)
 """Levels of rcl_interfaces/msg/Log for those of rosserial."""
 _STATUS = ("OK", "WARN", "ERROR")
-_READ_DEPTH = 10
+_READ_DEPTH = 32
 """Messages that wait for a board whose line is slower; the oldest go first."""
 
 
