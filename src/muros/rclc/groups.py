@@ -146,7 +146,7 @@ class ExecutorThread:
         self._spent = 0.0
 
     def add(self, handle: Any, *arguments: Any, **options: Any) -> None:
-        """Runs a handle in this thread; arguments as for ``Executor.add``. Also while it runs, from its callbacks."""
+        """Runs a handle in this thread; arguments as for ``Executor.add``. While it runs: from its callbacks alone."""
         self.executor.add(handle, *arguments, **options)
         self._owner.sharing.claim(handle, self._seat)
 
@@ -184,6 +184,11 @@ class ExecutorThread:
             return time.clock_gettime(time.pthread_getcpuclockid(thread.ident))
         except OSError:  # it has ended just now
             return self._spent
+
+    def claim(self) -> None:
+        """Makes sure that what the executor runs belongs to this thread, however it was added; used by ``Threads``."""
+        for handle in self.executor.handles:
+            self._owner.sharing.claim(handle, self._seat)
 
     def start(self) -> None:
         """Begins; used by ``Threads``."""
@@ -308,6 +313,7 @@ class Threads:
                 )
         for thread in self.threads:
             thread.policy = thread.policy or _policy_of(thread.groups)
+            thread.claim()
         self._failures.clear()
         self._started = True
         policies = [thread.policy for thread in self.threads if thread.policy is not None]
