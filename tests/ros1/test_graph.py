@@ -8,7 +8,8 @@ from contextlib import asynccontextmanager
 
 import pytest
 
-from muros.ros1 import ParameterTree, Ros1Error, Ros1Node, call
+from muros.ros1 import ApiError, ParameterTree, Ros1Error, Ros1Node, call, header
+from muros.ros1._topics import BACKLOG
 from tests.dds.peers import Peer
 from tests.ros1.peers import Master
 
@@ -235,6 +236,70 @@ def test_a_name_is_had_once(master: Master) -> None:
                 other.publish("/once", *STRING)
                 await until(lambda: any(report[0] == "ros1-shutdown" for report in node.reports))
                 await other.close()
+
+    asyncio.run(main())
+
+
+def test_a_subscriber_that_takes_nothing_stops_nobody(master: Master, ros: Peer) -> None:
+    async def main() -> None:
+        async with station(master) as node:
+            up = node.publish("/up", *STRING)
+            fields = {"callerid": "/stuck", "topic": "/up", "type": STRING[0], "md5sum": STRING[1]}
+            _, writer = await asyncio.open_connection("127.0.0.1", node._port, limit=1)
+            writer.write(header(fields))
+            heard = await ros.ask("subscriber", topic="/up", type="std_msgs/String")
+            await until(lambda: up.subscribers == 2)
+            writer.transport.pause_reading()  # type: ignore[attr-defined]
+            body = text("x" * 100_000)
+            while not up.dropped:
+                up.publish(body)
+                await asyncio.sleep(0)
+            stuck = next(each for each in up._connections if each.caller == "/stuck")
+            assert BACKLOG < stuck.backlog < BACKLOG + 2 * len(body)
+            await until(lambda: all(each.backlog == 0 for each in up._connections if each is not stuck))
+            up.publish(text("the others hear it"))
+            got = [{"data": ""}]
+            while got[-1]["data"] != "the others hear it":
+                got = await ros.ask("take", subscriber=heard)
+                assert got
+            writer.close()
+            await until(lambda: up.subscribers == 1)
+            await ros.ask("destroy", thing=heard)
+
+    asyncio.run(main())
+
+
+def test_a_slave_api_takes_no_nonsense(master: Master) -> None:
+    async def main() -> None:
+        async with station(master) as node:
+            node.publish("/up", *STRING)
+            down = node.subscribe("/down", *STRING, lambda body: None)
+            for method, arguments in (
+                ("requestTopic", ["/me", "/up", 5]),
+                ("requestTopic", ["/me", "/up", [[], [1], ["UDPROS"]]]),
+                ("requestTopic", ["/me", 7, []]),
+                ("paramUpdate", []),
+                ("shutdown", []),
+            ):
+                with pytest.raises(ApiError):
+                    await call(node.uri, method, *arguments)
+            await call(node.uri, "paramUpdate", "/me", 5, {})
+            await call(node.uri, "publisherUpdate", "/me", "/down", "http://no.list")
+            await call(
+                node.uri,
+                "publisherUpdate",
+                "/me",
+                "/down",
+                ["nonsense", "http://" + "x" * 300, "http://[", 5],
+            )
+            assert len(down.publishers) == 4
+            await call(
+                node.uri, "publisherUpdate", "/me", "/down", [f"http://127.0.0.1:9/{n}" for n in range(100)]
+            )
+            assert len(down.publishers) == 64
+            await asyncio.sleep(0.05)
+            assert await call(node.uri, "getPublications", "/me") == [["/up", STRING[0]]]
+            assert await call(node.uri, "getSubscriptions", "/me") == [["/down", STRING[0]]]
 
     asyncio.run(main())
 

@@ -13,7 +13,7 @@ class ParameterTree:
 
     def update(self, key: str, value: Any) -> None:
         """A parameter, or a whole branch, is something else now; an empty branch is none."""
-        parts = [part for part in key.split("/") if part]
+        parts = [part for part in str(key).split("/") if part]
         if not parts:
             self._tree = value if isinstance(value, dict) else {}
             return

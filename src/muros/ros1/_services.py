@@ -144,7 +144,7 @@ class ServiceClient:
 
     async def _connect(self, uri: str) -> None:
         host, _, port = uri.removeprefix("rosrpc://").rpartition(":")
-        if not uri.startswith("rosrpc://") or not port.isdecimal():
+        if not uri.startswith("rosrpc://") or not port.isdecimal() or not 0 < int(port) < 65536:
             raise Ros1Error(
                 f"{self.kind.service}: the master names {uri!r}, which is no address of a service"
             )

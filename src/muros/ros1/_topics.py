@@ -66,6 +66,7 @@ class Publication:
         self.kind = kind
         self.latch = latch
         self.dropped = 0
+        """Messages that one subscriber or another did not get."""
         self._node = node
         self._last: bytes | None = None
         self._connections: list[Connection] = []
@@ -144,7 +145,7 @@ class Subscription:
         while True:
             try:
                 await self._hear(uri)
-            except (Ros1Error, WireError) as error:
+            except (Ros1Error, WireError, UnicodeError) as error:
                 self._report(
                     f"cannot hear {uri} on {self.kind.topic}",
                     str(error),
@@ -161,9 +162,9 @@ class Subscription:
         answer: Any = await call(uri, "requestTopic", self._node, self.kind.topic, [["TCPROS"]])
         try:
             protocol, host, port = answer
-            if protocol != "TCPROS":
+            host, port = str(host), int(port)
+            if protocol != "TCPROS" or not 0 < port < 65536:
                 raise ValueError(protocol)
-            port = int(port)
         except (TypeError, ValueError):
             raise Ros1Error(f"{uri} offers no TCPROS but {answer!r}") from None
         loop = asyncio.get_running_loop()

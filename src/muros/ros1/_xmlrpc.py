@@ -67,7 +67,7 @@ async def call(uri: str, method: str, *arguments: Any, timeout: float = TIMEOUT)
                 writer.close()
     except TimeoutError:
         raise UnreachableError(f"{uri} did not answer within {timeout:g} s") from None
-    except (OSError, EOFError) as error:
+    except (OSError, EOFError, UnicodeError) as error:
         raise UnreachableError(f"{uri} cannot be reached: {error or 'it hung up'}") from None
     if " 200 " not in f"{status} ":
         raise ApiError(f"{uri} answers {status!r}")
@@ -137,8 +137,8 @@ class ApiServer:
             return xmlrpc.client.dumps(xmlrpc.client.Fault(-1, f"no method {method!r}")).encode()
         try:
             answer = [SUCCESS, "", handler(*arguments)]
-        except (Ros1Error, TypeError) as error:
-            answer = [0, str(error), 0]
+        except (Ros1Error, TypeError, ValueError, AttributeError, LookupError) as error:
+            answer = [0, str(error), 0]  # arguments that are none of the method's
         return xmlrpc.client.dumps((answer,), methodresponse=True, allow_none=True).encode()
 
 

@@ -116,11 +116,20 @@ class Ros1World:
         task.add_done_callback(self._tasks.discard)
         return task
 
-    def report(self, code: str, who: str, what: str, why: str, remedy: str, subject: str = "") -> None:
+    def report(
+        self, code: str, who: str, what: str, why: str, remedy: str, subject: str = "", n: int = 1
+    ) -> None:
         """Makes a finding."""
         if self._findings is not None:
             self._findings.report(
-                code, who=who, what=what, why=why, remedy=remedy, now=self._clock(), subject=subject or what
+                code,
+                who=who,
+                what=what,
+                why=why,
+                remedy=remedy,
+                now=self._clock(),
+                subject=subject or what,
+                n=n,
             )
 
     def _reporter(self, who: str) -> Callable[[str, str, str, str], None]:
@@ -297,7 +306,10 @@ class _Shaped:
 class _Publisher(_Shaped):
     def __init__(self, owner: Ros1BoardNode, topic: str, type_name: str, passing: _Passing) -> None:
         super().__init__(passing)
+        self._owner = owner
         self._node = owner.node
+        self._topic = topic
+        self._dropped = 0
         self._up = passing.up
         try:
             self._publication = owner.node.publish(
@@ -308,6 +320,18 @@ class _Publisher(_Shaped):
 
     def publish(self, body: bytes) -> None:
         self._publication.publish(self._up(body))
+        if self._publication.dropped != self._dropped:
+            new = self._publication.dropped - self._dropped
+            self._dropped = self._publication.dropped
+            self._owner.world.report(
+                "ros1-slow-subscriber",
+                self._owner.owner,
+                f"{{n}} message{{s}} of {self._topic} not sent to a ROS 1 subscriber",
+                "it takes less than comes",
+                "Look at what its callback does, or subscribe to something slower",
+                self._topic,
+                new,
+            )
 
     def close(self) -> None:
         self._node.remove(self._publication)
@@ -324,6 +348,8 @@ class _Subscriber(_Shaped):
     ) -> None:
         super().__init__(passing)
         self._node = owner.node
+        self._owner = owner
+        self._topic = topic
         self._down = passing.down
         self._on_data = on_data
         self._waiting: deque[bytes] = deque(maxlen=READ_DEPTH)
@@ -337,6 +363,15 @@ class _Subscriber(_Shaped):
 
     def _on_body(self, body: bytes) -> None:
         first = not self._waiting
+        if len(self._waiting) == READ_DEPTH:
+            self._owner.world.report(
+                "ros1-overrun",
+                self._owner.owner,
+                f"{{n}} message{{s}} of {self._topic} replaced by newer ones",
+                f"{READ_DEPTH} wait for the board, whose line is slower",
+                "Publish less often, or raise the rate of the line",
+                self._topic,
+            )
         self._waiting.append(body)
         if first:
             self._on_data()
