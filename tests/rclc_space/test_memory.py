@@ -27,7 +27,7 @@ def test_what_is_longer_than_the_rules_allow_is_refused(stage: Stage) -> None:
         stage.publish(publisher, String(data=text))
     stage.until(lambda: "end" in heard)
     assert heard == ["12345", "", "end"]
-    assert subscription.refused == 2  # type: ignore[attr-defined]
+    assert subscription.refused == 2
     assert problems == [
         (REFUSED, "11 B of std_msgs/msg/String dropped: data is longer than the rules allow"),
         (REFUSED, "12 B of std_msgs/msg/String dropped: data is longer than the rules allow"),
@@ -39,7 +39,7 @@ def test_without_on_problem_it_is_printed(capsys: pytest.CaptureFixture[str], st
     subscription = stage.node("listener").subscription(String, "words", None, memory=Rules(strings=1))
     stage.meet(publisher)
     stage.publish(publisher, String(data="long"))
-    stage.until(lambda: subscription.refused)  # type: ignore[attr-defined]
+    stage.until(lambda: subscription.refused)
     assert "muros: 9 B of std_msgs/msg/String dropped: data is longer" in capsys.readouterr().err
 
 

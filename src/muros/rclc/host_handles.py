@@ -37,6 +37,7 @@ class Subscription(subscription_.Subscription):
     """Made by ``Node.subscription``; its first malformed sample is a problem that is told."""
 
     topic = ""
+    refused = 0  # samples beyond the rules for memory
 
     def __init__(
         self, context: Context, kind: Any, callback: Callable[[Any], object] | None, qos: str | Qos

@@ -24,6 +24,9 @@ class Subscription(Handle):
     malformed = 0
     _waits = False
 
+    if TYPE_CHECKING:
+        refused: int  # samples beyond the rules for memory, where there are some, see ``memory``
+
     def __init__(self, context: "Context", kind: "Any", callback: "Callable[[Any], object] | None") -> None:
         super().__init__(context)
         self.callback = callback
