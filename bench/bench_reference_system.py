@@ -29,7 +29,16 @@ sys.path.insert(0, str(ROOT))
 
 from bench import _plots as plots  # noqa: E402
 from bench.reference_system import HOT_PATH, PLANNER, System, count_primes, node_names  # noqa: E402
-from muros.rclc import LET, Context, Executor  # noqa: E402
+from muros.rclc import (  # noqa: E402
+    BEST_EFFORT,
+    LET,
+    REAL_TIME_CRITICAL,
+    SOFT_REAL_TIME,
+    CallbackGroup,
+    Context,
+    Executor,
+    Threads,
+)
 
 PERIOD = 0.005
 """Seconds of a period of the executor in logical execution time."""
@@ -136,8 +145,6 @@ def let(context: Context, system: System) -> Callable[[float], object]:
 
 def groups(context: Context, system: System) -> Callable[[float], object]:
     """A thread for each real-time class: the hot path, the planner, the others."""
-    from muros.rclc.groups import BEST_EFFORT, REAL_TIME_CRITICAL, SOFT_REAL_TIME, CallbackGroup, Threads
-
     others = [name for name in node_names() if name not in HOT_PATH and name != PLANNER]
     threads = Threads(context)
     for name, urgency, names in (

@@ -17,7 +17,7 @@ import time
 
 from way import open_context
 
-from muros.rclc.groups import BEST_EFFORT, REAL_TIME_CRITICAL, CallbackGroup, Threads
+from muros.rclc import BEST_EFFORT, REAL_TIME_CRITICAL, CallbackGroup, Threads
 
 from std_msgs.msg import Int32
 
