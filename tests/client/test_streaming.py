@@ -3,6 +3,8 @@
 from typing import Any
 
 import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 
 from muros.client import CONNECTED
 from muros.client.raw import Raw
@@ -111,6 +113,35 @@ def test_elements_are_counted_and_aligned() -> None:
     assert source.streamer.publish(floats(), 0)
     world.run(50)
     assert floats.deserialize(device.heard[1]) == floats()
+
+
+@settings(max_examples=40)
+@given(
+    mtu=st.sampled_from([64, 128, 512]),
+    head=st.binary(max_size=150),
+    more=st.integers(0, 3000),
+    element=st.sampled_from([0, 1, 2, 4, 8]),
+    ahead=st.integers(0, 3),
+)
+def test_in_pieces_or_whole_it_is_the_same(
+    mtu: int, head: bytes, more: int, element: int, ahead: int
+) -> None:
+    world = World()
+    device = Device(world, mtu=mtu, queue=8).connect()
+    source = Source(device, element)
+    more -= more % (element or 1)
+    before = Raw(head + bytes(4) if element else head)
+    assume(before.size() + more)
+    for i in range(ahead):
+        assert device.writer.write_bytes(bytes([i]))
+    assert source.streamer.publish(before, more)
+    world.until(lambda: source.ended, 60_000)
+    world.run(50)
+    whole = head
+    if element:
+        whole += (more // element).to_bytes(4, "little")
+        whole += bytes(-len(whole) % element if more else 0)
+    assert device.heard[ahead:] == [whole + Source.data(more)]
 
 
 def test_a_small_one_is_one_message() -> None:
