@@ -1,6 +1,9 @@
 """NodeHandle on every runtime, with a host in the same program. See also ``tests/rosserial_client``."""
 
+from struct import pack_into
+
 from muros.compat import const, ticks_add, ticks_ms
+from muros.rosserial.device import Device
 from muros.rosserial.fields import (
     Message,
     exactly,
@@ -21,7 +24,7 @@ from muros.rosserial.messages import (
 )
 from muros.rosserial.node_handle import WARN, NodeHandle, parse
 from muros.rosserial.packets import Decoder, frame
-from tests.board.harness import raises
+from tests.board.harness import allocates, raises
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -298,3 +301,34 @@ def test_fields() -> None:
     assert exactly([1, 2], 2) == [1, 2]
     with raises(MessageError):
         read_count(b"\xff\xff\xff\x7f", 0, 4, 1)
+
+
+class Number(Message):
+    """An int32, as the generator writes it."""
+
+    TYPE = "std_msgs/Int32"
+    MD5 = "da5909fbe378aeaf85e547e830cc1bb7"
+
+    def __init__(self, data: int = 0) -> None:
+        self.data = data
+
+    def size(self) -> int:
+        return 4
+
+    def write(self, buf: bytearray, off: int) -> int:
+        pack_into("<i", buf, off, self.data)
+        return off + 4
+
+
+def test_publishing_numbers_allocates_nothing() -> None:
+    sent = [0]
+
+    def send(buf: "Buffer", off: int, n: int) -> None:
+        sent[0] = n
+
+    device = Device(send)
+    number = device.publisher("number", Number.TYPE, Number.MD5)
+    device.connected = True
+    message = Number(-5)
+    assert allocates(lambda: device.publish(number, message)) == 0
+    assert sent[0] == 12
