@@ -10,18 +10,18 @@ for another, which waits: so each, before it waits, rouses those that have somet
 
 from __future__ import annotations
 
-import asyncio
 import queue
 import threading
 import weakref
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # asyncio is imported where it is used: programs that have no loop need not load it
+    import asyncio
+
     from muros.rclc.host_executor import Executor
 
-Came = asyncio.Future[bool]
-"""Done when a wait is over; whether the thread that waited has said so."""
+    Came = asyncio.Future[bool]  # done when a wait is over; whether the thread that waited has said so
 
 _waiting: weakref.WeakKeyDictionary[Any, list[tuple[Executor, Came]]] = weakref.WeakKeyDictionary()
 """Who waits, by context."""
@@ -43,6 +43,8 @@ class Sleeper:
 
 async def pause(executor: Executor, timeout: float) -> None:
     """Waits until something may have come for an executor, at most `timeout` ms; lets others run in any case."""
+    import asyncio
+
     context = executor.context
     _rouse(executor)
     if timeout <= 0:
@@ -78,6 +80,8 @@ async def pause(executor: Executor, timeout: float) -> None:
 
 async def wait_async(middleware: Any, timeout: float) -> None:
     """Lets `timeout` ms pass, for a middleware that has `wait_async` of its own and can only be looked at again."""
+    import asyncio
+
     await asyncio.sleep(timeout / 1000)
 
 
