@@ -25,6 +25,8 @@ from muros.rosserial.tcp import Tcp
 from tests.dds.peers import ROOT, Peer
 from tests.ros1.peers import Master, require_tools
 
+pytestmark = pytest.mark.timeout(180)
+
 PROGRAM = Path(__file__).resolve().parent / "programs/micropython_board.py"
 SOURCES = ROOT / "build/peers/micropython-rosserial"
 ADDRESS = ("--bind", "127.0.0.1", "--name", "serial_node", "--tcp")
