@@ -60,16 +60,20 @@ def bars(title: str, y: str, groups: Sequence[str], series: Mapping[str, Sequenc
 
 
 def distribution(title: str, x: str, samples: Mapping[str, Sequence[float]], *, log: bool = False) -> str:
-    """How many percent of the samples are at most so large, a line for each of ``samples``; ``log``: of x."""
+    """How many percent of the samples are at most so large, a line for each of ``samples``.
+
+    ``log``: x is logarithmic, and begins where one percent of the samples is behind.
+    """
     kept = {name: sorted(v for v in values if _fits(v, log)) for name, values in samples.items()}
     plot = _Plot(title, x, "percent at most", list(kept))
     if not any(kept.values()):
         return plot.empty()
-    every = [value for values in kept.values() for value in values]
+    every = [value for values in kept.values() for value in (values[len(values) // 100 :] if log else values)]
     plot.scale_x(min(every), max(every), log=log)
     plot.scale_y(0.0, 100.0, log=False)
     for number, values in enumerate(kept.values()):
-        plot.line(number, _thin([(v, 100.0 * (i + 1) / len(values)) for i, v in enumerate(values)]))
+        shares = [(v, 100.0 * (i + 1) / len(values)) for i, v in enumerate(values)]
+        plot.line(number, _thin([point for point in shares if point[0] >= min(every)]))
     return plot.text()
 
 
@@ -100,8 +104,12 @@ class _Plot:
     def scale_x(self, low: float, high: float, *, log: bool = False) -> None:
         """The axis below, with its ticks."""
         self._x, ticks = _axis(low, high, log=log)
+        if not log and high - low > 1e-9 * max(abs(low), abs(high), 1.0):
+            self._x = low, high, False  # from the first value to the last
         for tick in ticks:
             at = self._at_x(tick)
+            if not _LEFT - 1 <= at <= _WIDTH - _RIGHT + 1:
+                continue
             self.parts.append(_stroke(at, _TOP, at, _HEIGHT - _BOTTOM))
             self.label(at, _HEIGHT - _BOTTOM + 18, _number(tick))
 
@@ -134,7 +142,7 @@ class _Plot:
             f'<rect x="{left:.1f}" y="{top:.1f}" width="{width - 1:.1f}" height="{max(foot - top, 0.5):.1f}" '
             f'fill="{_colour(number)}"/>'
         )
-        self.label(left + width / 2, top - 4, _number(value))
+        self.label(left + width / 2, top - 4, _number(value, 3))
 
     def label(self, x: float, y: float, text: str) -> None:
         """A text around a place."""
@@ -193,9 +201,9 @@ def _thin(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
     return kept
 
 
-def _number(value: float) -> str:
+def _number(value: float, digits: int = 4) -> str:
     """A number with as many digits as a plot needs."""
-    return f"{value:.0f}" if abs(value) >= 1000 and abs(value) < 1e7 else f"{value + 0.0:.4g}"
+    return f"{value:.0f}" if 10**digits / 10 <= abs(value) < 1e7 else f"{value + 0.0:.{digits}g}"
 
 
 def _colour(number: int) -> str:
