@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from threading import RLock
 
-from muros.interfaces import _api, _hashes, _ros1_code, _ros1_drift, _ros1_pairs
+from muros.interfaces import _api, _hashes
 from muros.interfaces._model import Field, FieldType, InterfaceError, Message, Service
 from muros.interfaces._names import KINDS
 from muros.interfaces._registry import Registry
@@ -166,8 +166,9 @@ _TIMES = {"builtin_interfaces/msg/Time": "time", "builtin_interfaces/msg/Duratio
 _RULE = "=" * 80
 
 
-
 def _convert(home: Registry, ros1_type: str, md5: str | None) -> Converter:
+    from muros.interfaces import _ros1_code, _ros1_drift, _ros1_pairs  # most programs have no need of them
+
     name = ros2_message(ros1_type)
     theirs, ours = _definition(home, ros1_type), home.message(name)
     known = _hashes.ros1_message_md5(home, theirs)
