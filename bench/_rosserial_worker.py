@@ -65,7 +65,10 @@ class Program:
             self.count, self.last = 0, 0
             self.delays.clear()
         elif command["do"] == "write":
+            start, rate = time.monotonic(), command.get("rate", 0)
             for i in range(command["n"]):
+                while rate and i > (time.monotonic() - start) * rate:
+                    await asyncio.sleep(0.001)
                 text = f"{time.monotonic_ns():016x}".ljust(command.get("size", 16), ".")
                 self.writer.write(self._string(data=text).serialize())
                 if command.get("period"):

@@ -285,11 +285,16 @@ class Bench:
 
     def _down(self, line: str, board: Board, server: Worker, program: Worker) -> None:
         n = self.sizes.frames
-        for name, size in (("String 16 B down", 16), ("String 200 B down", 200)):
+        for name, size, rate in (
+            ("String 16 B down", 16, 0),
+            ("String 200 B down", 200, 0),
+            ("String 16 B down, 10000/s", 16, 10_000),
+            ("String 200 B down, 10000/s", 200, 10_000),
+        ):
             board.received = 0
             before = server.do("look")["cpu"]
             start = time.monotonic()
-            program.begin("write", n=n, size=size)
+            program.begin("write", n=n, size=size, rate=rate)
             assert program.process.stdout is not None
             while not select.select([program.process.stdout], [], [], 0)[0]:
                 board.spin(0.005)
