@@ -7,7 +7,8 @@ import pytest
 
 from muros.client import Qos
 from muros.rclc import Context, Executor, Node, RclError
-from muros.space import open_space
+from muros.space import Liveliness, Topic, open_space
+from muros.space import Qos as SpaceQos
 from tests.client.world import World
 from tests.rclc.test_rclc import two
 from tests.rclc_space.ways import Stage
@@ -73,7 +74,7 @@ def test_what_an_agent_does_not_tell() -> None:
     world = World()
     alice, _ = two(world)
     subscription = alice.node.subscription(Int32, "value", nothing)
-    for name in ("matched", "incompatible_qos"):
+    for name in ("matched", "incompatible_qos", "liveliness_lost"):
         with pytest.raises(
             RclError, match=f"an agent does not tell of {name}: only deadline_missed"
         ) as caught:
@@ -143,6 +144,36 @@ def test_what_does_not_fit(node: Node) -> None:
     until(node, lambda: offered.events and wanted.events)
     assert (offered.totals, wanted.totals) == ([(1, 1)], [(1, 1)])
     assert "best effort" in wanted.events[0].why
+
+
+def test_a_publisher_that_falls_silent(dds_url: str) -> None:
+    context = Context(dds_url)
+    node = context.node("node")
+    seen = Seen()
+    subscription = node.subscription(Int32, "value", nothing)
+    node.on_events(subscription, liveliness_lost=seen)
+    other = open_space(dds_url)
+    theirs = Context(other)
+    topic = Topic("rt/value", "std_msgs::msg::dds_::Int32_")
+    by_hand = SpaceQos(liveliness=Liveliness.MANUAL_BY_TOPIC, lease=100_000_000)
+    writer = theirs.node("other").participant.participant.writer(topic, by_hand)
+    executors = [Executor(context), Executor(theirs)]
+
+    def both(condition: Callable[[], Any]) -> None:
+        for _ in range(1000):
+            if condition():
+                return
+            for executor in executors:
+                executor.spin_some(0.01)
+        raise AssertionError("it did not come about")
+
+    both(lambda: writer.matched)
+    writer.write(bytes(4))
+    both(lambda: seen.events)
+    assert seen.totals == [(1, 1)]
+    theirs.close()
+    other.close()
+    context.close()
 
 
 def test_deadlines_in_a_space() -> None:

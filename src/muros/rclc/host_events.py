@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 __all__ = ["Event", "EventSource", "Events", "SessionEvents", "make"]
 
 _UNSUPPORTED = 3
-DEADLINE_MISSED, INCOMPATIBLE_QOS, MATCHED, MESSAGE_LOST = NAMES = (
+DEADLINE_MISSED, INCOMPATIBLE_QOS, LIVELINESS_LOST, MATCHED, MESSAGE_LOST = NAMES = (
     "deadline_missed",
     "incompatible_qos",
+    "liveliness_lost",
     "matched",
     "message_lost",
 )
@@ -39,9 +40,9 @@ class Event:
     """What a callback is given."""
 
     name: str
-    """deadline_missed, incompatible_qos, matched or message_lost."""
+    """deadline_missed, incompatible_qos, liveliness_lost, matched or message_lost."""
     total: int
-    """How many there were: periods without a message, others that do not fit, matches, messages lost."""
+    """How many there were: periods without a message, others that do not fit, silences, matches, messages lost."""
     change: int
     """How many of them are new."""
     current: int = 0

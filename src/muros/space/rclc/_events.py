@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from muros.rclc.host_events import DEADLINE_MISSED, INCOMPATIBLE_QOS, MATCHED, MESSAGE_LOST
+from muros.findings import Finding
+from muros.rclc.host_events import DEADLINE_MISSED, INCOMPATIBLE_QOS, LIVELINESS_LOST, MATCHED, MESSAGE_LOST
 from muros.space._graph import GraphEvent, Incompatible, Matched, Unmatched
 
 if TYPE_CHECKING:
@@ -13,12 +14,14 @@ if TYPE_CHECKING:
 __all__ = ["SpaceEvents"]
 
 _NEVER = 1_000_000
+_SILENCE = ("writer-silent", "liveliness-lost")
+"""Findings of a reader about its writers, and of a writer about itself."""
 
 
 class SpaceEvents:
     """Counts what happens to a writer or reader; see `muros.rclc.host_events.EventSource`."""
 
-    names: tuple[str, ...] = (DEADLINE_MISSED, INCOMPATIBLE_QOS, MATCHED, MESSAGE_LOST)
+    names: tuple[str, ...] = (DEADLINE_MISSED, INCOMPATIBLE_QOS, LIVELINESS_LOST, MATCHED, MESSAGE_LOST)
 
     def __init__(self, context: SpaceMiddleware, owner: Any, entity: Any) -> None:
         self._context = context
@@ -28,10 +31,11 @@ class SpaceEvents:
         with self._lock:
             self._end.on_deadline = context.stir
             self._stop = context.ground.space.graph.watch(self._watch)
+            self._deaf = context.ground.space.findings.on_finding(self._hear)
             matched = len(self._end.matched)
             gid, topic = self._end.gid, context.ground.space.graph.topic(self._end.topic.name, context.domain)
             misfits = [m for m in topic.incompatible if gid in (m.writer.gid, m.reader.gid)] if topic else []
-        self._counts = {INCOMPATIBLE_QOS: len(misfits), MATCHED: matched}
+        self._counts = {INCOMPATIBLE_QOS: len(misfits), MATCHED: matched, LIVELINESS_LOST: 0}
         self._why = "; ".join(misfits[-1].reasons) if misfits else ""
 
     def count(self, name: str, now: int) -> int:
@@ -59,6 +63,7 @@ class SpaceEvents:
         """Counts no more."""
         with self._lock:
             self._stop()
+            self._deaf()
 
     def _watch(self, event: GraphEvent) -> None:
         """The graph has changed; called with the lock held."""
@@ -72,3 +77,12 @@ class SpaceEvents:
             self._counts[INCOMPATIBLE_QOS] += 1
             self._why = "; ".join(event.reasons)
         self._context.stir()
+
+    def _hear(self, finding: Finding) -> None:
+        """The space reports something: liveliness is told of in no other way."""
+        if finding.code in _SILENCE and (finding.who, finding.subject) == (
+            self._end.owner,
+            self._end.topic.name,
+        ):
+            self._counts[LIVELINESS_LOST] += finding.new
+            self._context.stir()
