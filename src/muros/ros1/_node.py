@@ -300,12 +300,13 @@ class Ros1Node:
         return 0
 
     def _on_shutdown(self, caller: str, reason: str = "") -> int:
-        self._report(
-            "ros1-shutdown",
-            f"the ROS 1 graph wants node {self.name} to end",
-            reason or "no reason is given",
-            "Two nodes of one name throw each other out: give one another name",
-        )
+        if not self._ended:
+            self._report(
+                "ros1-shutdown",
+                f"the ROS 1 graph wants node {self.name} to end",
+                reason or "no reason is given",
+                "Two nodes of one name throw each other out: give one another name",
+            )
         return 0
 
     def _accept(self) -> Connection:

@@ -165,6 +165,7 @@ class Ros1BoardNode:
             "/rosout", self._log_type, interfaces.md5(self._log_type), _text(self._log_type)
         )
         self._diagnostics: tuple[Publication, Converter] | None = None
+        self._callers: list[_Caller] = []
 
     def publisher(self, name: str, type_name: str, md5: str) -> _Publisher:
         """A board's publisher."""
@@ -184,7 +185,9 @@ class Ros1BoardNode:
     ) -> _Caller:
         """A board's service client."""
         halves = _halves(type_name, request_md5, response_md5)
-        return _Caller(self, self.resolve(name, "service"), type_name, *halves, on_reply)
+        made = _Caller(self, self.resolve(name, "service"), type_name, *halves, on_reply)
+        self._callers.append(made)
+        return made
 
     def server(
         self, name: str, type_name: str, request_md5: str, response_md5: str, on_data: Callable[[], object]
@@ -230,6 +233,8 @@ class Ros1BoardNode:
 
     def close(self) -> None:
         """The node leaves the graph."""
+        for caller in self._callers:
+            caller.close()
         self.world.later(self._leave())
 
     def resolve(self, name: str, what: str) -> str:
