@@ -274,6 +274,7 @@ def test_a_slave_api_takes_no_nonsense(master: Master) -> None:
         async with station(master) as node:
             node.publish("/up", *STRING)
             down = node.subscribe("/down", *STRING, lambda body: None)
+            await until(lambda: len(node._known) == 2)  # the master has told of the publishers there are
             for method, arguments in (
                 ("requestTopic", ["/me", "/up", 5]),
                 ("requestTopic", ["/me", "/up", [[], [1], ["UDPROS"]]]),
