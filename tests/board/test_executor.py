@@ -36,7 +36,8 @@ class Way(Agent):
         self.on_wait: "Callable[[], object] | None" = None
 
     def wait(self, timeout: int) -> None:
-        self.now += max(timeout, 1)
+        if not self.inbox:
+            self.now += max(timeout, 1)
         if self.on_wait is not None:
             self.on_wait()
 
@@ -365,6 +366,49 @@ def test_let_answers_and_requests_leave_at_the_end() -> None:
     client.deliver(asked[0], bytes((9, 0, 0, 0)), 0, 4)
     executor.spin_one_period()
     assert seen[0].data == 9
+
+
+def test_let_runs_nothing_between_two_periods() -> None:
+    bench = Bench()
+    got: "list[int]" = []
+    a = bench.node.subscription(Number, "a", None)
+    executor = bench.executor(semantics=_LET, period=0.01)
+    executor.add(a, lambda m: got.append(m.data))
+    bench.connect()
+    give(a, 1)
+    give(a, 2)
+    assert got == []
+    executor.spin_one_period()
+    assert (got, a.lost) == ([2], 1)
+
+
+def test_a_callback_in_let_may_destroy_ping_and_close() -> None:
+    bench = Bench(history=1)
+    out = bench.node.publisher(Number, "out")
+    other = bench.node.publisher(Number, "other")
+    pinged: "list[bool]" = []
+
+    def destroy() -> None:
+        out.publish(number(1))
+        other.destroy()
+
+    def call() -> None:
+        out.publish(number(2))
+        pinged.append(bench.context.ping(0.1))
+        bench.context.close()
+
+    executor = bench.executor(semantics=_LET, period=0.01)
+    timer = bench.node.timer(0, destroy)
+    executor.add(timer)
+    bench.connect()
+    executor.spin_one_period()
+    timer.cancel()
+    executor.spin_one_period()
+    assert bench.written() == [1]
+    executor.add(bench.node.timer(0, call))
+    executor.spin_period()
+    assert pinged == [True]
+    assert bench.session.state == 0
 
 
 def overrun(policy: int) -> "Any":

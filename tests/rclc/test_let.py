@@ -23,6 +23,7 @@ from muros.rclc import (
     CapacityError,
     Executor,
     GuardCondition,
+    Qos,
     RclError,
     always,
     one,
@@ -235,6 +236,31 @@ def test_a_let_of_several_periods(local: InSpace) -> None:
     assert [at for at, topic, _ in plan.heard.values() if topic == "out_1"] == [10, 20, 30, 40, 50, 60]
     order = [topic for at, topic, _ in plan.heard.values() if at == 30]
     assert order == ["out_0", "out_1"], "in the order of adding, whenever they were called"
+
+
+@pytest.mark.parametrize(("let", "periods"), [(0.0101, 2), (0.0105, 2), (0.07, 7), (0.0701, 8), (0.003, 1)])
+def test_a_let_is_rounded_up_to_whole_periods(local: InSpace, let: float, periods: int) -> None:
+    plan = Plan(local, 1, lets=(let,))
+    plan.run(periods)
+    assert plan.heard.values() == [(10 * periods, "out_0", 0)]
+
+
+def test_what_does_not_fit_the_depth_is_not_run_early(local: InSpace) -> None:
+    """Between two periods no callback runs: the oldest is dropped and counted."""
+    publisher = local.talker.node("talker").publisher(Int32, "in")
+    got: list[tuple[int, int]] = []
+    executor = local.executor(semantics=LET, period=0.01)
+    subscription = local.context.node("node").subscription(Int32, "in", None, Qos(depth=2))
+    executor.add(subscription, lambda message: got.append((local.now - start, message.data)))
+    start = local.now
+    executor.spin_one_period()
+    for i in range(5):
+        publisher.publish(Int32(data=i))
+        local.context.middleware.spin_once()
+    assert got == []
+    executor.spin_one_period()
+    assert got == [(10, 3)]
+    assert subscription.lost == 3
 
 
 def test_a_let_of_exactly_two_periods_ends_with_the_second(local: InSpace) -> None:

@@ -44,6 +44,7 @@ def add(
         from muros.rclc.handle_error import refuse
 
         refuse(self, handle)
+    handle.eager = self.trigger is None
     if when or hasattr(self, "let"):
         borrow("muros.rclc.periods").prepare(self, handle, when, let, messages)
     others = handle.handles or self.context.handles
@@ -51,7 +52,6 @@ def add(
         others.remove(handle)
     if callback is not None:
         handle.callback = callback
-    handle.eager = self.trigger is None
     handle.handles = self.handles
     self.handles.append(handle)
 

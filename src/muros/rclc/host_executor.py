@@ -144,7 +144,7 @@ class Executor(executor_.Executor):
         handles.add(self, handle, callback)
         if self.let is not None:
             task = self.let.task(handle)
-            task.let = let * 1000  # type: ignore[assignment]  # boards count whole ones
+            task.let = round(let * 1000, 6)  # type: ignore[assignment]  # boards count whole ones
             task.always = when == ALWAYS
             task.messages = messages or self.let.messages
         elif when == ALWAYS:
@@ -437,7 +437,7 @@ class Executor(executor_.Executor):
 def _milliseconds(seconds: Any, name: str = "period") -> float:
     if not isinstance(seconds, int | float) or not 0 < seconds < math.inf:
         raise WrongValueError(f"{name} is {seconds!r}: it must be a number of seconds above 0")
-    return seconds * 1000
+    return round(seconds * 1000, 6)
 
 
 def _patience(seconds: float | None) -> float:

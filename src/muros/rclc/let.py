@@ -116,14 +116,14 @@ class Let:
 
         A period that is ``timed`` ends at a time of its own: callbacks may be too late.
         """
-        self._number += 1
-        self._start = now
-        self._timed = timed
-        executor = self.executor
         if self._calling:
             from muros.rclc.errors import RclError
 
             raise RclError("an executor with LET cannot be spun by one of its callbacks")
+        self._number += 1
+        self._start = now
+        self._timed = timed
+        executor = self.executor
         if len(self._tasks) > len(executor.handles):
             for handle in list(self._tasks):
                 if handle not in executor.handles:
@@ -153,7 +153,7 @@ class Let:
             task.begun = task.end = self._number
             task.released = now
             if self.period and task.let > self.period:
-                task.end += (task.let - 1) // self.period
+                task.end += -(-task.let // self.period) - 1
         self._released = ready
         return len(ready) > 0
 
@@ -253,10 +253,17 @@ class Let:
 
 
 class Outputs:
-    """What callbacks publish over a session, held back: while a callback runs this is the backlog of the session."""
+    """What callbacks publish over a session, held back: while a callback runs this is the backlog of the session.
+
+    ``items`` are requests that do not wait for the end of the period.
+    """
+
+    cutter = None
+    _cut = None
 
     def __init__(self, session: "Any") -> None:
         self.session = session
+        self.items: "list[Any]" = []
         self._task: "Any" = None
 
     def open(self, task: Task) -> "Any":
@@ -268,7 +275,13 @@ class Outputs:
 
     def close(self, backlog: "Any") -> None:
         """No more."""
-        self.session.backlog = backlog
+        session = self.session
+        session.backlog = backlog
+        if self.items:
+            backlog = borrow("muros.client.requests").keep(session)
+            backlog.items += self.items
+            self.items = []
+            backlog.pump()
 
     def defer(self, writer: "Any", message: "Any", n: int) -> bool:
         """Takes a sample. CapacityError when the writer has published too many."""
@@ -290,8 +303,11 @@ class Outputs:
         return True
 
     def first(self, data: "Any") -> bool:
-        """A request that is larger than a message has to wait."""
+        """A request that is larger than a message has to wait, until it is made again."""
         return False
+
+    def pump(self) -> None:
+        """Nothing leaves meanwhile."""
 
     def flush(self, task: Task) -> None:
         """Has everything leave that waits."""
