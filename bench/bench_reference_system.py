@@ -19,6 +19,7 @@ import json
 import resource
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -129,18 +130,18 @@ def on_one(context: Context, system: System, names: Iterable[str], **options: An
 
 def single(context: Context, system: System) -> Callable[[float], object]:
     """In the order of making."""
-    return _until(on_one(context, system, node_names()), context)
+    return _until(on_one(context, system, node_names()))
 
 
 def prioritised(context: Context, system: System) -> Callable[[float], object]:
     """The hot path first, the planner next."""
-    return _until(on_one(context, system, _important_first()), context)
+    return _until(on_one(context, system, _important_first()))
 
 
 def let(context: Context, system: System) -> Callable[[float], object]:
     """The hot path first, in periods: what a callback publishes leaves at the end of the period."""
     executor = on_one(context, system, _important_first(), semantics=LET, period=PERIOD)
-    return _until(executor, context)
+    return _until(executor)
 
 
 def groups(context: Context, system: System) -> Callable[[float], object]:
@@ -198,11 +199,12 @@ def _important_first() -> list[str]:
     return names + [name for name in node_names() if name not in names]
 
 
-def _until(executor: Executor, context: Context) -> Callable[[float], object]:
+def _until(executor: Executor) -> Callable[[float], object]:
     def spin(end: float) -> None:
-        timer = context.node("clock").timer(end - time.monotonic(), executor.stop)
-        executor.add(timer)
+        stopper = threading.Timer(end - time.monotonic(), executor.stop)
+        stopper.start()
         executor.spin()
+        stopper.join()
 
     return spin
 
