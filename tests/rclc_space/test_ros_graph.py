@@ -61,6 +61,7 @@ def test_a_board_sees_the_nodes_of_rclpy(board: Context, ros: Peer, domain: int)
     assert graph.wait_for_node("robot", timeout=PATIENCE)
     assert graph.wait_for_subscriptions("words", timeout=PATIENCE)
     assert graph.wait_for_service("/reset", timeout=PATIENCE)
+    assert graph.wait_for_publishers("/parameter_events", timeout=PATIENCE)
     assert graph.nodes() == ["/lab/board", "/lab/robot"]
     assert graph.topics()["/lab/words"] == ["std_msgs/msg/String"]
     assert graph.services()["/reset"] == ["std_srvs/srv/Trigger"]
