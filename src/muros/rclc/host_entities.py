@@ -37,6 +37,7 @@ class Publisher:
 
         It waits for nothing, unless there is a ``timeout`` (None: ``session_timeout``): then so many seconds at most
         until a reliable message is confirmed: by the agent, or straight in a space by every reader. False if it is not.
+        Callbacks must not wait.
         """
         if not isinstance(message, self._kind) and not fits(message, self._kind):
             raise other(message, self._kind, "publish")

@@ -92,7 +92,7 @@ class Context(context_.Context):
         args: Sequence[str] | None = None,
         **options: Unpack[SessionOptions],
     ) -> None:
-        self.arguments = RosArguments.parse(sys.argv[1:] if args is None else args)
+        self.arguments = RosArguments.parse(getattr(sys, "argv", ())[1:] if args is None else args)
         if domain_id is not None and not (isinstance(domain_id, int) and 0 <= domain_id <= _LARGEST_DOMAIN):
             raise WrongValueError(f"domain_id is {domain_id!r}: it must be from 0 to {_LARGEST_DOMAIN}")
         if space is not None:
