@@ -3,6 +3,7 @@
 A7 numbers the facts about the multi-threaded executors of rclc.
 """
 
+import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -376,6 +377,96 @@ def test_what_a_callback_of_states_raises_ends_all_threads(alone: Crew) -> None:
     threads.executor("patient").add(node.timer(LONG, lambda: None))
     with pytest.raises(ThreadError, match="'carrier' has ended: RuntimeError: CONNECTED"):
         threads.run(LONG)
+
+
+def test_a_thread_may_have_all_end(alone: Crew) -> None:
+    node = alone.node()
+    threads = alone.threads(node.context)
+    threads.executor("patient").add(node.timer(LONG, lambda: None))
+    ended: list[bool] = []
+
+    def end() -> None:
+        ended.append(threads.stop())
+
+    threads.executor("ender").add(node.timer(0.001, end))
+    threads.run(PATIENCE)
+    assert ended == [False], "it cannot wait for itself"
+    assert not any(thread.alive for thread in threads.threads)
+    assert node.context.running
+
+
+def test_a_context_is_run_by_one_crew_at_a_time(alone: Crew) -> None:
+    node = alone.node()
+    ticks: list[int] = []
+    first, second = alone.threads(node.context), alone.threads(node.context)
+    first.executor("first").add(node.timer(0.001, lambda: ticks.append(1)))
+    second.executor("second").add(node.timer(LONG, lambda: None))
+    with first:
+        with pytest.raises(RclError, match="the threads of this context run already"):
+            second.start()
+        assert second.stop()
+        ticks.clear()
+        until(lambda: ticks)
+    with second:
+        assert second.threads[0].alive
+    with pytest.raises(TypeError, match="Threads needs a context, not 5"):
+        Threads(5)  # type: ignore[arg-type]
+
+
+def test_a_callback_of_problems_may_close_the_context(crew: Crew) -> None:
+    """Also one that is called in the middle of publishing, while nobody else may use the session."""
+    context = crew.context()
+    node = context.node("node")
+    publisher = node.publisher(Int32, "number")
+    closed: list[str] = []
+
+    def on_problem(code: int, text: str) -> None:
+        if not closed:
+            closed.append(text)
+            context.close()
+
+    context.on_problem(on_problem)
+    threads = crew.threads(context)
+
+    def flood() -> None:
+        while publisher.publish(Int32()):
+            pass  # a session has no room for many; a space has
+        publisher.destroy()
+        publisher.publish(Int32())
+
+    own = threads.executor("own")
+    own.add(node.timer(LONG, lambda: None))
+    if crew.way.direct:
+        publisher.destroy()
+    with threads:
+        crew.meet()
+        own.call(flood)
+        assert threads.join(PATIENCE)
+    assert closed
+    assert not context.running
+
+
+PROGRAM = """
+import threading
+from muros.rclc import Context, REAL_TIME_CRITICAL, CallbackGroup, Threads
+context = Context("local:")
+group = CallbackGroup("control", REAL_TIME_CRITICAL)
+ticked = threading.Event()
+group.add(context.node("node").timer(0.001, ticked.set))
+threads = Threads(context)
+threads.assign(group)
+threads.start()
+assert ticked.wait(20)
+print("done")
+"""
+
+
+def test_a_program_ends_although_its_threads_run() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=50, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, "done\n"), done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_the_time_that_threads_compute_is_known(alone: Crew) -> None:

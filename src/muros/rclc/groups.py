@@ -25,6 +25,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Final
 
 from muros.rclc import scheduling
+from muros.rclc.context import Context as AnyContext
 from muros.rclc.errors import RclError
 from muros.rclc.host_checks import WrongTypeError
 from muros.rclc.host_executor import Executor
@@ -182,7 +183,7 @@ class ExecutorThread:
             return self._spent
         try:
             return time.clock_gettime(time.pthread_getcpuclockid(thread.ident))
-        except OSError:  # it has ended just now
+        except (OSError, AttributeError):  # it has ended just now; a system that does not tell
             return self._spent
 
     def claim(self) -> None:
@@ -216,6 +217,7 @@ class ExecutorThread:
     def _run(self) -> None:
         sharing = self._owner.sharing
         try:
+            scheduling.name_thread(self.name)
             self.problem = scheduling.apply(self.policy, self.cpus)
             sharing.sit(self._seat)
             self._settled.set()
@@ -252,6 +254,8 @@ class Threads:
         keep_going: bool = False,
         switch_interval: float | None = SWITCH_INTERVAL,
     ) -> None:
+        if not isinstance(context, AnyContext):
+            raise WrongTypeError(f"Threads needs a context, not {context!r}")
         self.context = context
         self.sharing = share(context)
         self.keep_going = keep_going
@@ -314,29 +318,27 @@ class Threads:
         for thread in self.threads:
             thread.policy = thread.policy or _policy_of(thread.groups)
             thread.claim()
-        self._failures.clear()
-        self._started = True
         policies = [thread.policy for thread in self.threads if thread.policy is not None]
         urgent = [policy for policy in policies if policy.real_time]
-        if urgent and self.switch_interval is not None:
-            self._hurries = True
-            _hurry.begin(self.switch_interval)
-        carrier = _above(urgent)
         said: list[str] = []
         settled = threading.Event()
 
         def prepare() -> None:
-            said.append(scheduling.apply(carrier))
+            said.append(scheduling.apply(_above(urgent)))
             settled.set()
 
-        self.sharing.on_failure = self._carrier_failed
-        self.sharing.start(prepare)
+        self.sharing.start(prepare, self._carrier_failed)
+        self._failures.clear()
+        self._started = True
+        if urgent and self.switch_interval is not None:
+            self._hurries = True
+            _hurry.begin(self.switch_interval)
         for thread in self.threads:
             thread.start()
         for thread in self.threads:
             thread.settle()
         settled.wait()
-        self._tell_scheduling(said[0] if said else "")
+        self._tell_scheduling(said[0])
 
     def stop(self, timeout: float | None = None) -> bool:
         """Ends all threads when the callbacks that run are over; whether they have ended within ``timeout`` seconds.

@@ -122,8 +122,8 @@ class GuardCondition(guard_.GuardCondition):
     def trigger(self) -> None:
         """Makes it ready, from any thread.
 
-        An executor that waits straight in a data space wakes at once; one that waits for an agent within the time
-        until it would look again by itself, at most ``keepalive``.
+        An executor that waits wakes at once; where a transport of your own has it wait, within 10 ms from the second
+        time on.
         """
         super().trigger()
         wake = getattr(self.context.middleware, "wake", None)

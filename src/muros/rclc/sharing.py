@@ -46,6 +46,8 @@ __all__ = ["Bell", "Ended", "Seat", "Sharing", "call_elsewhere", "hand_over", "s
 _NEVER = 1_000_000
 _DEPTH = 1000
 """Samples that wait for what has no queue of its own."""
+_PATIENCE = 2.0
+"""Seconds that the end of the carrier is waited for."""
 _NAP = 10
 """Milliseconds for which a middleware is waited on that cannot be woken."""
 _LOOK = 5
@@ -208,8 +210,8 @@ class Mailbox:
 class Sharing:
     """The middleware of a context that several threads run; what is not here is that of the real one.
 
-    ``start`` begins the carrier, ``stop`` ends it; ``carrier`` is its thread while it runs. ``on_failure(error)`` is
-    told, in that thread, what callbacks of states and problems raise, which run there.
+    ``start`` begins the carrier, ``stop`` ends it; ``carrier`` is its thread while it runs. Callbacks of states run
+    there, and what they raise ends it.
     """
 
     def __init__(self, context: Context) -> None:
@@ -217,7 +219,6 @@ class Sharing:
         self.real: Any = context.middleware
         self.running = False
         self.carrier: threading.Thread | None = None
-        self.on_failure: Callable[[BaseException], object] = _ignore
         self.common = Seat("the other threads")
         self._seats: dict[int, Seat] = {}
         self._owners: WeakKeyDictionary[Any, Seat] = WeakKeyDictionary()
@@ -234,25 +235,37 @@ class Sharing:
 
     # Threads
 
-    def start(self, prepare: Callable[[], object] = lambda: None) -> None:
-        """Begins the carrier, which calls ``prepare`` first."""
+    def start(
+        self,
+        prepare: Callable[[], object] = lambda: None,
+        on_failure: Callable[[BaseException], object] = lambda error: None,
+    ) -> None:
+        """Begins the carrier, which calls ``prepare()`` first, and ``on_failure(error)`` if it ends by an error.
+
+        Raises RclError when it runs already.
+        """
         if self.carrier is not None:
             raise RclError("the threads of this context run already")
         for handle in self.context.handles:
             self.claim(handle, self.common)
         self._starter = threading.get_ident()
         self.running = True
-        carrier = threading.Thread(target=self._carry, args=(prepare,), name="muros carrier", daemon=True)
+        carrier = threading.Thread(
+            target=self._carry, args=(prepare, on_failure), name="muros carrier", daemon=True
+        )
         self.carrier = carrier
         carrier.start()
 
     def stop(self) -> None:
-        """Ends the carrier. What waits in mailboxes goes on to its handles when somebody spins."""
+        """Ends the carrier. What waits in mailboxes goes on to its handles when somebody spins.
+
+        Who is asked to by a callback that holds the lock of the session goes on before the carrier has ended.
+        """
         self.running = False
         self._wake_carrier()
         carrier = self.carrier
         if carrier is not None and carrier is not threading.current_thread():
-            carrier.join()
+            carrier.join(_PATIENCE)
         self._announce_turn()
 
     def sit(self, seat: Seat) -> None:
@@ -463,7 +476,7 @@ class Sharing:
         """What threads that have ended left behind."""
         return sum(seat.hand_on() for seat in {self.common, *self._owners.values()} if seat.waiting)
 
-    def _carry(self, prepare: Callable[[], object]) -> None:
+    def _carry(self, prepare: Callable[[], object], on_failure: Callable[[BaseException], object]) -> None:
         """The carrier's thread."""
         real = self.real
         clock = self.context.clock
@@ -478,7 +491,7 @@ class Sharing:
                     left = real.deadline(now)
                     real.wait(max(int(left if wakes else min(left, _NAP)), 0))
         except BaseException as error:
-            self.on_failure(error)
+            on_failure(error)
         finally:
             self.running = False
             self.carrier = None
@@ -567,7 +580,3 @@ def share(context: Context) -> Sharing:
 
 def _at_once(function: Callable[[], object]) -> None:
     function()
-
-
-def _ignore(error: BaseException) -> None:
-    """Nobody wants to know."""
