@@ -455,6 +455,22 @@ def test_x26_trigger_all_takes_the_newest(local: InSpace) -> None:
     assert said == ["Hello World!3", "3", "Hello World!6", "6"]
 
 
+@pytest.mark.parametrize("how", ["added", "not added", "trigger set later"])
+def test_until_a_trigger_says_so_nothing_runs_early(local: InSpace, how: str) -> None:
+    topics = Topics(local, 1, Qos(depth=10))
+    subscription = topics.subscriptions[0]
+    subscription.depth = 2
+    executor = local.executor(trigger=None if how == "trigger set later" else all_of())
+    if how != "not added":
+        executor.add(subscription)
+    gate = GuardCondition(local.context, print)
+    executor.trigger = all_of(subscription, gate)
+    topics.say(*[(0, i) for i in range(5)])
+    assert not executor.spin_some(0.0)
+    assert topics.got == []
+    assert subscription.lost == 3
+
+
 def test_x27_trigger_of_the_users_own(local: InSpace) -> None:
     topics = Topics(local, 2)
     seen: list[list[Any]] = []
@@ -719,3 +735,13 @@ def test_errors_bear_the_codes_of_the_c_library() -> None:
     codes = json.loads((Path(__file__).parents[1] / "vectors/rmw/return_codes.json").read_text())["rcl"]
     assert HandleError.code == codes["INVALID_ARGUMENT"]
     assert CapacityError.code == codes["ERROR"]
+
+
+def test_the_numbers_of_problems_are_told_apart() -> None:
+    from muros.rclc import host_executor, host_handles, let
+    from muros.space import rclc
+
+    ours = {let.OVERRUN, host_executor.CALLBACK, host_handles.MALFORMED}
+    theirs = {rclc.ENCODING, rclc.NETWORK, rclc.NOT_SPUN, rclc.OTHER, *rclc.PROBLEMS.values()}
+    assert len(ours) == 3
+    assert not ours & theirs

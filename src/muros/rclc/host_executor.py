@@ -267,14 +267,10 @@ class Executor(executor_.Executor):
 
         ``late``: the pass is due, so a trigger that does not ask for news has its ALWAYS subscriptions called.
         """
-        try:
-            self.context.middleware.spin_once(now)
-        except Exception as error:
-            if not self.survives(getattr(error, "raised_by", None), error):
-                raise
+        trigger = self.trigger
+        self._serve(now)
         if self.let is not None:
             return bool(self.let.work(now, late))
-        trigger = self.trigger
         if self.always:
             if not self._wanted(now, late):
                 return False
@@ -378,7 +374,10 @@ class Executor(executor_.Executor):
             let.finish()
 
     def _serve(self, now: int) -> None:
-        """Lets the middleware work, between passes."""
+        """Lets the middleware work; what a callback has raised meanwhile is told or comes out."""
+        if self.trigger is not None or self.let is not None:
+            for handle in self.handles:
+                handle.eager = False  # those that nobody has added, too
         try:
             self.context.middleware.spin_once(now)
         except Exception as error:
