@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from muros.compat import ticks_add
 from muros.rosserial.device import Device
-from muros.rosserial.packets import VERSION_GROOVY, VERSION_HYDRO, frame
+from muros.rosserial.packets import ANY_VERSION, VERSION_GROOVY, VERSION_HYDRO, frame
 from tests.rosserial_client.replay import Raw, opened
 
 REQUEST = bytes.fromhex("fffe0000ff0000ff")
@@ -176,3 +176,21 @@ def test_any_bytes_leave_a_board_that_works(junk: bytes) -> None:
     board.hear(REQUEST, 10_000)
     board.device.tick(11_500)
     assert board.device.connected or board.device.decoder.pending
+
+
+@pytest.mark.parametrize("version", [VERSION_HYDRO, ANY_VERSION])
+def test_an_unconnected_board_answers_who_looks_for_it(version: int) -> None:
+    board = Board(version=version)
+    board.hear(b"\xff\x00", 0)
+    board.hear(b"\xff", 1)
+    board.hear(b"\x00", 2)
+    assert [topic_id for topic_id, _ in board.take()] == [10, 10]
+    board.hear(b"\x00\x01\xff", 3)
+    board.hear(REQUEST, 4)  # the FF before it was none of its own
+    assert [topic_id for topic_id, _ in board.take()] == [10]
+    assert board.device.connected
+    board.hear(b"\xff\x00", 5)
+    assert board.take() == []  # it is connected
+    silent = Board(version=VERSION_GROOVY)
+    silent.hear(b"\xff\x00", 0)
+    assert silent.take() == []

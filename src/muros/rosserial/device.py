@@ -3,7 +3,9 @@
 A board says nothing of itself until it is asked. At the topic request it asks for the time, names everything it
 publishes and then everything it wants, and counts as connected; there is no acknowledgement. From then on it asks for
 the time every 2.5 s, and as long as answers come it stays connected: 11 s without one and it falls silent until it is
-asked again. It may be asked at any moment, and repeats everything. All of this is what ros_lib does, byte for byte.
+asked again. It may be asked at any moment, and repeats everything. While it is not connected it answers an FF that
+begins no frame of its version with a request for the time: so a host learns which version it speaks, and that it has
+started anew. All of this is what ros_lib does, byte for byte.
 """
 
 from muros.compat import const, ticks_add, ticks_diff
@@ -37,7 +39,9 @@ if TYPE_CHECKING:
 _BUFFER = const(512)
 _SUBSCRIBERS = const(25)
 _ANY_VERSION = const(0)
+_SYNC = const(0xFF)
 _VERSION_HYDRO = const(0xFE)
+_VERSION_GROOVY = const(0xFF)
 _MAX_PAYLOAD = const(0xFFFF)
 
 _ID_PUBLISHER = const(0)
@@ -94,6 +98,7 @@ class Device:
         self._publishers: "list[tuple[int, TopicInfo]]" = []
         self._subscribers: "list[tuple[int, TopicInfo]]" = []
         self._handlers: "list[Callable[[bytearray, int, int], object]]" = []
+        self._sync = False
         self._now = 0
         self._asked = 0
         self._answered = 0
@@ -135,7 +140,11 @@ class Device:
     def feed(self, data: "Buffer", n: int, now: int) -> None:
         """Takes ``data[:n]``, which came at ``now`` (ticks in ms)."""
         self._now = now
-        self.decoder.feed(data, n, now)
+        decoder = self.decoder
+        before = decoder.frames
+        decoder.feed(data, n, now)
+        if not self.connected and decoder.frames == before:
+            self._look_for_sync(data, n)
 
     def tick(self, now: int) -> int:
         """Does what is due; returns in how many ms to call again at the latest."""
@@ -212,6 +221,17 @@ class Device:
                 self.unknown_ids += 1
         except MessageError:
             self.malformed += 1
+
+    def _look_for_sync(self, data: "Buffer", n: int) -> None:
+        """Whoever speaks another version, or looks for boards that have started anew, is shown the own version."""
+        strange = False
+        for i in range(n):
+            byte = data[i]
+            if self._sync and byte != _VERSION_HYDRO and not (self._follow and byte == _VERSION_GROOVY):
+                strange = True
+            self._sync = byte == _SYNC and not self._sync
+        if strange and self._version == _VERSION_HYDRO:  # ros_lib of Groovy says nothing
+            self._ask_time()
 
     def _on_topic_request(self) -> None:
         self._ask_time()
