@@ -172,12 +172,12 @@ EXECUTORS: dict[str, Callable[[Context, System], Callable[[float], object]]] = {
 def print_indicators(rows: dict[str, Figures]) -> None:
     """The key performance indicators side by side."""
     print(
-        "\nexecutor      cpu %  memory MB  missed  front lidar lost  hot path ms mean  worst  planner jitter ms"
+        "\nexecutor      cpu %  memory MB  missed  front lidar lost  hot path ms mean   worst  planner jitter ms"
     )
     for name, row in rows.items():
         print(
             f"{name:<12}{row['cpu']:>7.1f}{row['memory']:>11.1f}{row['missed']:>8}"
-            f"{row['lost']:>10} of {row['sent']:<5}{row['mean']:>16.2f}{row['worst']:>7.2f}{row['jitter']:>19.3f}"
+            f"{row['lost']:>10} of {row['sent']:<5}{row['mean']:>16.2f}{row['worst']:>8.2f}{row['jitter']:>19.3f}"
         )
 
 
