@@ -18,6 +18,7 @@ from tests.rclc_space.ways import PATIENCE
 
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 SETTLE = "rcl_interfaces/srv/SetParameters"
 BOOL = 1
@@ -69,6 +70,26 @@ def test_a_board_sees_the_nodes_of_rclpy(board: Context, ros: Peer, domain: int)
     assert [end.node for end in graph.servers(node="robot") if end.name == "/reset"] == ["/lab/robot"]
     ros.do("reset")
     assert graph.wait(lambda seen: seen.nodes() == ["/lab/board"], timeout=PATIENCE)
+
+
+def test_no_request_is_lost_to_a_service_that_was_waited_for(
+    board: Context, dds_url: str, ros: Peer, domain: int
+) -> None:
+    straight = Context(dds_url)
+    nodes = [board.node("board"), straight.node("program")]
+    theirs = ros.do("node", name="robot", domain=domain)
+    for n in range(5):
+        ros.do(
+            "service", node=theirs, name=f"/reset_{n}", type="std_srvs/srv/Trigger", rule="{'success': True}"
+        )
+        for node in nodes:
+            client = node.client(Trigger, f"/reset_{n}")
+            assert client.wait_for_service(timeout=PATIENCE)
+            reply = client.call(Trigger.Request(), timeout=PATIENCE)
+            assert reply is not None, (n, node.full_name)
+            assert reply.success
+            client.destroy()
+    straight.close()
 
 
 def test_rclpy_sets_our_clock_and_our_levels(dds_url: str, ros: Peer, domain: int) -> None:
