@@ -112,7 +112,7 @@ def test_leds_are_switched_and_topics_are_heard(distro: str, peer: Fetch, rig: R
         heard = rig.ask(ros, "subscription", node=node, topic="/chatter", type="std_msgs/msg/String", qos=100)
         imus = rig.ask(ros, "subscription", node=node, topic="/imu", type="sensor_msgs/msg/Imu")
         for name in ("chatter", "imu"):
-            made: Any = board.server.core.boards[0].endpoints[0, name]
+            made: Any = board.server.core.boards[0].roster.endpoints[0, name, 0]
             rig.until(partial(lambda each: each.publisher._writer.matched, made))
 
         def talk() -> None:
@@ -147,7 +147,7 @@ def test_services_both_ways(distro: str, peer: Fetch, rig: Rig, domain: Domain) 
             type="std_srvs/srv/SetBool",
             rule="{'success': request.data, 'message': 'lit'}",
         )
-        lamp: Any = board.server.core.boards[0].endpoints[4, "lamp"]
+        lamp: Any = board.server.core.boards[0].roster.endpoints[4, "lamp", 0]
         rig.until(lambda: lamp.caller.ready)
         answer = board.do(rig, lambda: board.lamp.call(SetBool.Request(data=True), 10_000))
         assert (answer.success, answer.message) == (True, "lit")

@@ -768,3 +768,77 @@ def test_parameter_requests_are_answered_before_any_topic_is_named() -> None:
     assert board.taken(ID_PARAMETER_REQUEST)
     assert board.values is not None
     assert board.values.ints == [50]
+
+
+def test_a_board_may_have_several_endpoints_of_one_name() -> None:
+    scene = Scene()
+    board = RosLib(scene)
+    ups = [board.publisher("talk", "std_msgs/String") for _ in range(2)]
+    downs = [board.subscriber("hear", "std_msgs/String") for _ in range(2)]
+    board.plug()
+    scene.until(lambda: board.connected)
+    hear = scene.reader("/talk", STRING)
+    write = scene.writer("/hear", STRING)
+    for _ in range(3):  # also after being asked again
+        scene.step(1_000)
+        for i, up in enumerate(ups):
+            board.send(up, string(f"from {i}"))
+        write(data="to all")
+        scene.step(5)
+        assert [message.data for message in hear()] == ["from 0", "from 1"]
+        assert [board.taken(down) for down in downs] == [[string("to all")]] * 2
+        board.boot()
+        scene.until(lambda: board.connected)
+        scene.step(400)
+    assert len(scene.core.boards[0].roster.endpoints) == 4
+
+
+def test_one_number_may_serve_both_directions() -> None:
+    """As ids of both directions are apart, a subscriber that is named again takes no publisher's id away."""
+    scene = Scene()
+    board = RosLib(scene)
+    up = board.publisher("up", "std_msgs/String")
+    board.subscriber("down", "std_msgs/String")
+    board.infos[1][1].topic_id = up
+    board.plug()
+    scene.until(lambda: board.connected)
+    hear = scene.reader("/up", STRING)
+    write = scene.writer("/down", STRING)
+    for _ in range(2):
+        scene.step(1_000)
+        board.send(up, string("up"))
+        write(data="down")
+        scene.step(5)
+        assert [message.data for message in hear()] == ["up"]
+        assert board.taken(up) == [string("down")]
+        board.boot()
+        scene.until(lambda: board.connected)
+
+
+def test_ids_that_are_given_anew_never_carry_another_topic() -> None:
+    """Another firmware numbers the same topics otherwise; also one that names them without being asked."""
+    for asked in (True, False):
+        scene = Scene()
+        board = RosLib(scene)
+        ids = {name: board.subscriber(name, "std_msgs/String") for name in ("a", "b", "c")}
+        board.plug()
+        scene.until(lambda: board.connected)  # noqa: B023
+        writers = {name: scene.writer(f"/{name}", STRING) for name in ids}
+        scene.step(400)
+        turned = dict(zip(ids, [ids["c"], ids["a"], ids["b"]], strict=True))
+        for _, info in board.infos:
+            info.topic_id = turned[info.topic_name]
+        if asked:
+            board.boot()
+            scene.until(lambda: board.connected)  # noqa: B023
+        else:
+            for half, info in board.infos:
+                body = bytearray(info.size())
+                info.write(body, 0)
+                board.send(half, bytes(body))
+        scene.step(2_000)
+        for name, write in writers.items():
+            write(data=name)
+        scene.step(5)
+        for name, topic_id in turned.items():
+            assert board.taken(topic_id) == [string(name)]

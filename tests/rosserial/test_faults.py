@@ -269,8 +269,8 @@ def test_a_flood_of_topics_and_findings_takes_no_memory() -> None:
         foe.send(2, bytes(body))
         foe.send(300 + i, b"x")
     board = scene.core.boards[0]
-    assert len(board.endpoints) <= scene.core.limits.max_endpoints
-    assert len(board._halves) <= scene.core.limits.max_endpoints + 1
+    assert len(board.roster.endpoints) <= scene.core.limits.max_endpoints
+    assert len(board.roster._halves) <= scene.core.limits.max_endpoints + 1
     assert len(scene.findings.snapshot()) <= scene.findings.capacity + 10
 
 

@@ -70,6 +70,7 @@ HOST_ONLY = frozenset(
         "muros/rosserial/server/_output.py",
         "muros/rosserial/server/_parameters.py",
         "muros/rosserial/server/_ros1_world.py",
+        "muros/rosserial/server/_roster.py",
         "muros/rosserial/server/_server.py",
         "muros/rosserial/server/_space_world.py",
         "muros/rosserial/server/_status.py",

@@ -17,7 +17,7 @@ What a request names again stays as it is: nobody in the graph sees a board's re
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
 from muros.rosserial.constants import (
@@ -46,7 +46,6 @@ from muros.rosserial.packets import ANY_VERSION, Decoder, frame
 from muros.rosserial.server._diagnosis import Suspicions
 from muros.rosserial.server._door import Node, RefusedError
 from muros.rosserial.server._endpoints import (
-    Endpoint,
     Publication,
     ServiceClient,
     ServiceServer,
@@ -54,6 +53,7 @@ from muros.rosserial.server._endpoints import (
 )
 from muros.rosserial.server._output import Link, Output
 from muros.rosserial.server._parameters import answer_of, plain_name
+from muros.rosserial.server._roster import Roster
 from muros.rosserial.server.events import (
     BoardBack,
     BoardHeard,
@@ -62,7 +62,6 @@ from muros.rosserial.server.events import (
     BoardReady,
     BoardReset,
     BufferKnown,
-    EndpointSetUp,
 )
 
 if TYPE_CHECKING:
@@ -113,7 +112,8 @@ _CHECK_AFTER = 700
 """Silence before checks begin, in ms."""
 _TRIES = 3
 """Unanswered topic requests in the version that was heard until both are tried again; also requests after damage."""
-_BRANCHES = {0: ID_PUBLISHER, 1: ID_SUBSCRIBER, 2: ID_SERVICE_SERVER, 3: ID_SERVICE_SERVER, 4: 4, 5: 4}
+_LAST_HALF = ID_SERVICE_CLIENT + 1
+"""Up to this id a frame names a topic or a half of a service."""
 _MISSES = 2
 _BITS = 10
 """Bits of a byte on a serial line, start and stop bit included."""
@@ -142,7 +142,7 @@ class Board:
         self.decoder = Decoder(core.limits.max_payload, self._on_frame, ANY_VERSION)
         self.output = Output(link, address, 0, core.limits.lead, core.limits.max_requests)
         self.node: Node | None = None
-        self.endpoints: dict[tuple[int, str], Endpoint] = {}
+        self.roster = Roster(self)
         self.input_buffer = 0
         """The board's buffer for what it is sent; 0 until it was announced."""
         self.output_buffer = 0
@@ -158,9 +158,9 @@ class Board:
         """From the last topic request to its first answer, in ms."""
         self.suspicions = Suspicions(self)
         self._now = 0
-        self._incoming: dict[int, Callable[[bytes, int], bool]] = {}
-        self._halves: dict[tuple[int, str], dict[int, TopicInfo]] = {}
-        self._round = 0
+        self.round = 0
+        """The number of the last topic request."""
+        self._incoming = self.roster.incoming
         self._open_asks: list[int] = []
         self._asked_at = 0
         self._first_ask = 0
@@ -199,7 +199,7 @@ class Board:
         self._open_asks.clear()
         self._first_ask = self.heard_at = now
         self._told_ready = False
-        self._restart()
+        self.roster.restart()
         self.suspicions.begin(now)
         self._ask(now)
         self._plan(now)
@@ -216,7 +216,7 @@ class Board:
             return
         self._step(LINE_DOWN)
         self.output.clear()
-        self._restart()
+        self.roster.restart()
         self._lose(reason, now)
         self._plan(now)
 
@@ -243,11 +243,7 @@ class Board:
 
     def close(self) -> None:
         """Takes everything of it out of the world."""
-        for endpoint in self.endpoints.values():
-            endpoint.close()
-        self.endpoints.clear()
-        self._incoming.clear()
-        self._halves.clear()
+        self.roster.close()
         if self.node is not None:
             self.node.close()
             self.node = None
@@ -273,9 +269,7 @@ class Board:
                 self._ask(now)
             if not self._told_lost and now >= self.heard_at + self.core.limits.lost:
                 self._lose(f"silent for {(now - self.heard_at) / 1000:.0f} s", now)
-        for endpoint in list(self.endpoints.values()):
-            if isinstance(endpoint, ServiceServer) and endpoint.until is not None:
-                endpoint.turn(now)
+        self.roster.tick(now)
         if self.lost_at is not None and now >= self.lost_at + self.core.limits.keep_lost:
             self._forget(now)
         self._plan(now)
@@ -345,7 +339,7 @@ class Board:
         if self.version and len(self._open_asks) >= _TRIES - 1:
             self.decoder.version = ANY_VERSION
         both = self.decoder.version == ANY_VERSION
-        self._round += 1
+        self.round += 1
         self.asks += 1
         self._asked_at = now
         self._open_asks.append(now)
@@ -388,34 +382,30 @@ class Board:
     def _settled(self, now: int) -> None:
         """The board has said everything, as far as one can tell."""
         self._settle_at = None
-        missing = [each for each in self.endpoints.values() if each.round != self._round]
-        halves = [name for (_, name), found in self._halves.items() if len(found) < 2]
+        missing = self.roster.missing()
         damaged = self.suspicions.damage != self._damage
-        if (missing or halves or damaged) and self._misses < (_TRIES if damaged else _MISSES):
+        if (missing or damaged or self.roster.halved()) and self._misses < (_TRIES if damaged else _MISSES):
             self._misses += 1
             self._ask(now)
             return
         self._misses = 0
         for endpoint in missing:
-            self._remove(endpoint)
+            self.roster.remove(endpoint)
         if not self._told_ready and self.node is not None:
             self._told_ready = True
             self.core.tell(
                 BoardReady(
                     self.label,
                     self.node_name,
-                    self._count(Publication),
-                    self._count(Subscription),
-                    self._count(ServiceServer),
-                    self._count(ServiceClient),
+                    self.roster.count(Publication),
+                    self.roster.count(Subscription),
+                    self.roster.count(ServiceServer),
+                    self.roster.count(ServiceClient),
                     (now - self._first_ask) / 1000,
                 )
             )
-            if not self.endpoints:
+            if not self.roster.endpoints:
                 self.suspicions.no_topics()
-
-    def _count(self, kind: type[Endpoint]) -> int:
-        return sum(isinstance(each, kind) for each in self.endpoints.values())
 
     def _lose(self, reason: str, now: int) -> None:
         if self.node is not None and self.lost_at is None:
@@ -431,10 +421,6 @@ class Board:
             return
         self.close()
         self._told_ready = False
-
-    def _restart(self) -> None:
-        for endpoint in self.endpoints.values():
-            endpoint.restart()
 
     # Frames
 
@@ -481,7 +467,7 @@ class Board:
     def _protocol(self, topic_id: int, buf: Buffer, off: int, n: int, now: int) -> bool:
         if topic_id == ID_TIME:
             self._time(now)
-        elif topic_id in _BRANCHES:
+        elif topic_id <= _LAST_HALF:
             self._named(topic_id, topic_info_untrusted(buf, off, n), now)
         elif topic_id == ID_LOG:
             level, text = log_untrusted(buf, off, n)
@@ -509,7 +495,7 @@ class Board:
             and self._settle_at is None
         ):
             self.resets += 1
-            self._restart()
+            self.roster.restart()
             self.core.tell(BoardReset(self.label))
             self._told_ready = False
             self._first_ask = now
@@ -529,21 +515,7 @@ class Board:
                 self.core.tell(BufferKnown(self.label, "publish", info.buffer_size))
             self.output_buffer = max(self.output_buffer, info.buffer_size)
             self.decoder.limit = min(self.core.limits.max_payload, max(self.output_buffer, OVERHEAD))
-        branch = _BRANCHES[half]
-        key = (branch, info.topic_name)
-        infos: tuple[TopicInfo, ...] = (info,)
-        if branch in (ID_SERVICE_SERVER, ID_SERVICE_CLIENT):
-            halves = self._halves.setdefault(key, {})
-            if len(self._halves) > self.core.limits.max_endpoints:
-                del self._halves[key]
-                self._too_many()
-                return
-            halves[half - branch] = info
-            if len(halves) < 2:
-                return
-            infos = (halves[0], halves[1])
-        if self.node is not None:
-            self._set_up(key, infos)
+        self.roster.named(half, info)
 
     def _answered_topics(self, now: int) -> None:
         if self.state != SYNCED or self.node is None:
@@ -551,115 +523,6 @@ class Board:
         self._settle_at = now + self.core.limits.settle
         self.wake(self._settle_at)
         self._open_asks.clear()
-
-    def _set_up(self, key: tuple[int, str], infos: tuple[TopicInfo, ...]) -> None:
-        says = (infos[0].message_type, *(info.md5sum for info in infos))
-        known = self.endpoints.get(key)
-        if known is not None and known.says == says:
-            for info in known.infos:
-                self._incoming.pop(info.topic_id, None)
-            known.infos = infos
-        else:
-            if known is not None:
-                self._remove(known)
-            elif len(self.endpoints) >= self.core.limits.max_endpoints:
-                self._too_many()
-                return
-            try:
-                known = self._make(key[0], infos)
-            except RefusedError as error:
-                self._refuse(key[0], infos, error)
-                return
-            self.endpoints[key] = known
-            for info in infos[-1:] if len(infos) == 1 else infos:
-                self._said(known, info)
-            self._warn(known)
-        known.round = self._round
-        receive = getattr(known, "receive", None)
-        if receive is not None:
-            self._incoming[infos[0].topic_id] = receive
-
-    def _make(self, branch: int, infos: tuple[TopicInfo, ...]) -> Endpoint:
-        assert self.node is not None
-        info = infos[0]
-        name, kind = info.topic_name, info.message_type
-        if branch == ID_PUBLISHER:
-            return Publication(self, infos, self.node.publisher(name, kind, info.md5sum))
-        if branch == ID_SUBSCRIBER:
-            subscription = Subscription(self, infos)
-            subscription.begin(self.node.subscriber(name, kind, info.md5sum, subscription.on_data))
-            return subscription
-        if branch == ID_SERVICE_SERVER:
-            server = ServiceServer(self, infos)
-            server.begin(self.node.server(name, kind, infos[1].md5sum, info.md5sum, server.on_data))
-            return server
-        client = ServiceClient(self, infos)
-        client.begin(self.node.caller(name, kind, info.md5sum, infos[1].md5sum, client.on_reply))
-        return client
-
-    def _said(self, endpoint: Endpoint, info: TopicInfo) -> None:
-        if info is endpoint.infos[0]:
-            self.core.tell(
-                EndpointSetUp(self.label, endpoint.kind, endpoint.name, endpoint.type_name, info.buffer_size)
-            )
-
-    def _warn(self, endpoint: Endpoint) -> None:
-        """What can be said at once: a definition that differs, messages that cannot fit, or are slow for the line."""
-        shape = endpoint.shape
-        if shape.drift:
-            self.report(
-                "old-definition",
-                subject=endpoint.name,
-                what=f"{endpoint.name} of {self.who} is converted from another definition of {endpoint.type_name}",
-                why=shape.drift,
-                remedy="Nothing; or generate the firmware's message headers anew",
-            )
-        out = isinstance(endpoint, Publication)
-        info = endpoint.infos[0 if out or len(endpoint.infos) == 1 else 1]
-        room = info.buffer_size - OVERHEAD if out else info.buffer_size
-        if shape.least_size > room:
-            buffer = "OUTPUT_SIZE" if out else "INPUT_SIZE"
-            self.report(
-                "buffer-too-small",
-                subject=endpoint.name,
-                what=f"no message on {endpoint.name} fits {self.who}",
-                why=f"a {endpoint.type_name} has {shape.least_size} B at least, and {buffer} is {info.buffer_size} B",
-                remedy=f"Enlarge {buffer} of the board's NodeHandle_",
-            )
-        elif not out:
-            endpoint.warn_slow(shape.least_size)
-
-    def _refuse(self, branch: int, infos: tuple[TopicInfo, ...], error: RefusedError) -> None:
-        """Only that topic is refused; what comes on it is passed over, and no new request is made for its id."""
-        info = infos[0]
-        kind = {0: "publisher", 1: "subscriber", 2: "service server", 4: "service client"}[branch]
-        self.report(
-            "topic-refused",
-            subject=f"{kind} {info.topic_name}",
-            what=f"Creation of {kind} failed: {info.topic_name} [{info.message_type}] of {self.who}",
-            why=error.why,
-            remedy=error.remedy,
-        )
-        if branch != ID_SUBSCRIBER:
-            self._incoming[info.topic_id] = _pass_over
-
-    def _remove(self, endpoint: Endpoint) -> None:
-        for key, each in list(self.endpoints.items()):
-            if each is endpoint:
-                del self.endpoints[key]
-                self._halves.pop(key, None)
-        for info in endpoint.infos:
-            if getattr(self._incoming.get(info.topic_id), "__self__", None) is endpoint:
-                del self._incoming[info.topic_id]
-        endpoint.close()
-
-    def _too_many(self) -> None:
-        self.report(
-            "too-many-topics",
-            what=f"a topic of {self.who} is not set up",
-            why=f"it has {self.core.limits.max_endpoints} already",
-            remedy="Allow more with the limit max_endpoints",
-        )
 
     def _log(self, level: int, text: str) -> None:
         self.core.tell(BoardLog(self.label, level, text))
@@ -704,8 +567,3 @@ class Board:
         if now >= self._asked_at + self.core.limits.ask:
             self._ask(now)
             self._plan(now)
-
-
-def _pass_over(body: bytes, now: int) -> bool:
-    """What comes on a refused topic; the refusal was said."""
-    return True

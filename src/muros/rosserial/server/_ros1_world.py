@@ -70,6 +70,9 @@ class Ros1World:
         self.parameters = ParameterTree()
         self._simulated: int | None = None
         self._tasks: set[asyncio.Task[Any]] = set()
+        self.services: frozenset[str] = frozenset()
+        """What the graph served when it was looked at last."""
+        self._looking: asyncio.Task[Any] | None = None
 
     async def open(self) -> None:
         """Reads the parameters of the graph. Raises :class:`muros.ros1.Ros1Error` if there is no master."""
@@ -88,6 +91,8 @@ class Ros1World:
 
     async def close(self) -> None:
         """Takes what is left out of the graph."""
+        if self._looking is not None:
+            self._looking.cancel()
         await self._own.close()
         while self._tasks:
             await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -108,6 +113,11 @@ class Ros1World:
     def setting(self, node: str, name: str) -> Any:
         """The parameter ``~name`` of a node, None if it is not set."""
         return self.parameters.get(f"{node}/{name}")
+
+    def watch_services(self) -> None:
+        """Keeps ``services`` up to date from now on: the master tells of none by itself."""
+        if self._looking is None:
+            self._looking = self.later(self._look())
 
     def later(self, work: Any) -> asyncio.Task[Any]:
         """Runs a coroutine beside everything else, until it is done."""
@@ -131,6 +141,15 @@ class Ros1World:
                 subject=subject or what,
                 n=n,
             )
+
+    async def _look(self) -> None:
+        while True:
+            try:
+                _, _, services = await self._own.ask("getSystemState")
+                self.services = frozenset(str(name) for name, _ in services)
+            except (Ros1Error, ValueError, TypeError):
+                self.services = frozenset()
+            await asyncio.sleep(LOOK)
 
     def _reporter(self, who: str) -> Callable[[str, str, str, str], None]:
         return lambda code, what, why, remedy: self.report(code, who, what, why, remedy)
@@ -399,14 +418,13 @@ class _Caller(_Shaped):
         self._request, self._response = request, response
         self._on_reply = on_reply
         self._client = owner.node.client(service, type_name, md5)
-        self._uri = ""
         self._number = 0
         self._calls: set[asyncio.Task[Any]] = set()
-        self._look = owner.world.later(self._find())
+        owner.world.watch_services()
 
     @property
     def ready(self) -> bool:
-        return bool(self._uri)
+        return self._service in self._owner.world.services
 
     def call(self, body: bytes) -> int:
         self._number += 1
@@ -416,27 +434,17 @@ class _Caller(_Shaped):
         return self._number
 
     def close(self) -> None:
-        self._look.cancel()
         for task in self._calls:
             task.cancel()
         self._client.close()
 
-    async def _find(self) -> None:
-        """Keeps an eye on whether somebody serves it."""
-        while True:
-            try:
-                self._uri = await self._owner.node.lookup(self._service)
-            except Ros1Error:
-                self._uri = ""
-            await asyncio.sleep(LOOK)
-
     async def _answer(self, number: int, body: bytes) -> None:
         node = self._owner.node
         try:
-            self._uri = await node.lookup(self._service)
-            if not self._uri:
+            uri = await node.lookup(self._service)
+            if not uri:
                 raise Ros1Error("nobody serves it")
-            answer = self._response.down(await self._client.call(self._uri, body))
+            answer = self._response.down(await self._client.call(uri, body))
         except (Ros1Error, BodyError, OSError, TimeoutError) as error:
             self._owner.world.report(
                 "ros1-call-failed",
