@@ -93,6 +93,41 @@ def test_stop_from_a_thread_ends_a_wait_at_once(stage: Stage) -> None:
     run(program())
 
 
+def test_closing_the_context_ends_a_wait(stage: Stage) -> None:
+    stage.node("node")
+    stage.meet()
+    context = stage.contexts[0]
+
+    async def program() -> None:
+        task = asyncio.create_task(Executor(context, timeout=LONG).spin_async())
+        await asyncio.sleep(0.01)
+        context.close()
+        await asyncio.wait_for(task, PATIENCE)
+
+    run(program())
+
+
+def test_what_waiting_raises_comes_out(stage: Stage) -> None:
+    """The thread that waits hands on what it meets, and waits again afterwards."""
+    stage.node("node")
+    stage.meet()
+    executor = Executor(stage.contexts[0])
+    executor.add(GuardCondition(stage.contexts[0], print))
+    middleware: Any = stage.contexts[0].middleware
+
+    def fails(timeout: float) -> None:
+        raise OSError("gone")
+
+    async def program() -> None:
+        middleware.wait = fails
+        with pytest.raises(OSError, match="gone"):
+            await executor.spin_some_async(1.0)
+        del middleware.wait
+        assert not await executor.spin_some_async(0.01)
+
+    run(program())
+
+
 def test_a_guard_condition_ends_a_wait(stage: Stage) -> None:
     stage.node("node")
     stage.meet()
