@@ -8,6 +8,7 @@ it may have begun to listen only after our answer.
 """
 
 from collections.abc import Callable, Iterable
+from itertools import islice
 from typing import Final
 
 from muros.rtps._agenda import Agenda, Timed
@@ -30,6 +31,9 @@ AGAIN: Final = (100 * MILLISECOND, 400 * MILLISECOND, SECOND)
 
 PAUSE: Final = 50 * MILLISECOND
 """Participants at one place hear each other's mail: so soon after it was told, it is not told again."""
+
+NEIGHBOURS_MOST: Final = 8
+"""Participants of another process that are asked whether they know of ours; else one more is told, which is no harm."""
 
 PLACES_MOST: Final = 1024
 """Places remembered for that."""
@@ -155,13 +159,21 @@ class Announcer(Timed):
 class Welcome(Timed):
     """Tells those just met that a participant is there, until they seem to know.
 
-    knows: whether the participant with a prefix has said something to ours.
+    knows: whether the participant with a prefix has said something to ours. neighbours: those of its process, as far
+    as it is of this kind.
     """
 
-    __slots__ = ("_agenda", "_announcer", "_due", "_knows")
+    __slots__ = ("_agenda", "_announcer", "_due", "_knows", "_neighbours")
 
-    def __init__(self, announcer: Announcer, agenda: Agenda, knows: Callable[[GuidPrefix], bool]) -> None:
+    def __init__(
+        self,
+        announcer: Announcer,
+        agenda: Agenda,
+        knows: Callable[[GuidPrefix], bool],
+        neighbours: Callable[[Peer], Iterable[Peer]],
+    ) -> None:
         super().__init__()
+        self._neighbours = neighbours
         self._announcer = announcer
         self._agenda = agenda
         self._knows = knows
@@ -189,10 +201,5 @@ class Welcome(Timed):
 
     def _is_known_at(self, peer: Peer) -> bool:
         """Whether another participant of the same process knows of ours: what one hears, all know."""
-        return peer.kin and any(
-            other is not peer
-            and other.kin
-            and other.discovery == peer.discovery
-            and self._knows(other.prefix)
-            for other in self._announcer.peers.values()
-        )
+        longest_there = islice(self._neighbours(peer), NEIGHBOURS_MOST)
+        return any(other is not peer and self._knows(other.prefix) for other in longest_there)

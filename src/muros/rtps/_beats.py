@@ -10,7 +10,7 @@ from typing import Final
 from muros.rtps._constants import ENTITYID_UNKNOWN
 from muros.rtps._endpoint import Place, Send, first_count
 from muros.rtps._keeping import Keeper
-from muros.rtps._reader_proxy import ReaderProxy
+from muros.rtps._reader_proxy import Audience, ReaderProxy
 from muros.rtps._values import EntityId, GuidPrefix
 from muros.rtps._wire import heartbeat
 
@@ -18,21 +18,21 @@ __all__ = ["Beats"]
 
 
 class Beats:
-    """Those of one writer. readers: all that are matched, kept up to date by it. `sent`: the last sample that left."""
+    """Those of one writer to its audience. `sent`: the last sample that left."""
 
-    __slots__ = ("_count", "_entity", "_keeper", "_readers", "_send")
+    __slots__ = ("_audience", "_count", "_entity", "_keeper", "_send")
 
     def __init__(
         self,
         entity: EntityId,
         send: Send,
         keeper: Keeper,
-        readers: dict[tuple[GuidPrefix, EntityId], ReaderProxy],
+        audience: Audience,
     ) -> None:
         self._entity: Final = entity
         self._send = send
         self._keeper = keeper
-        self._readers = readers
+        self._audience = audience
         self._count = 0
 
     def begin(self, now: int) -> None:
@@ -79,10 +79,9 @@ class Beats:
         for reader in readers:
             groups.setdefault(reader.places, []).append(reader)
         for places, group in groups.items():
-            there = [reader.start for reader in self._readers.values() if reader.places == places]
-            if len(group) > 1 and 2 * len(group) > len(there):
+            if len(group) > 1 and 2 * len(group) > self._audience.at(places):
                 final = all(_knows_all(reader, sent) for reader in group)
-                beat = self.for_all(sent, final=final, start=min(there))
+                beat = self.for_all(sent, final=final, start=min(reader.start for reader in group))
                 for place in places:
                     self._send([beat], None, place)
             else:

@@ -257,7 +257,8 @@ class Discovery(Timed):
                 or (inline_qos is not None and status_info(inline_qos) & _GONE)
             ):
                 guid = key_untrusted(sample.payload, sample.inline_qos)
-                self._domain.left(guid, sample, now)
+                if guid in known.endpoints:  # the first to hear it says so to all
+                    self._domain.left(guid, sample, now)
                 return True
             endpoint = self._domain.endpoint_data(sample.payload)
         except (InvalidDiscoveryData, InvalidParameters) as error:

@@ -281,8 +281,9 @@ class DomainCore:
             if place is INSIDE or (self._reply is not None and self._reply[0] == destination):
                 send(submessages, destination, place)
             else:
-                size = others.kin.get(place)
-                gather.add(prefix, submessages, destination, place, size is not None, size or SIZE)
+                kin = others.kin.get(place)
+                size = SIZE if kin is None else kin.size
+                gather.add(prefix, submessages, destination, place, kin is not None, size)
 
         return collect
 

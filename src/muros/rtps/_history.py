@@ -94,6 +94,11 @@ class History:
         """The samples held, oldest first."""
         return iter(self._samples.values())
 
+    @property
+    def ends(self) -> bool:
+        """Whether an instance ends in what is held."""
+        return bool(self._ending)
+
     def get(self, sequence: int) -> Sample | None:
         """The sample with this number, None if it is not held (any more)."""
         return self._samples.get(sequence)

@@ -76,7 +76,8 @@ class Keeper:
     def release(self, sent: int, now: int) -> None:
         """Readers have acknowledged or gone: forget what is no longer needed, and say that there is room."""
         if self.retains:
-            self.history.end_to(self.acknowledged(sent))
+            if self.history.ends:
+                self.history.end_to(self.acknowledged(sent))
         else:
             self.history.drop_to(self.acknowledged(sent))
         self.retry(sent, now)

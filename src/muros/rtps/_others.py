@@ -5,7 +5,7 @@ than the comparison. What was overtaken on the way by a newer one, or by a farew
 known, and how often one may say something else, is limited.
 """
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from muros.rtps._constants import PROTOCOL_VERSION, StatusInfo
 from muros.rtps._discovery_data import InvalidDiscoveryData, ParticipantData, key_untrusted
@@ -20,7 +20,7 @@ from muros.rtps._values import Guid, GuidPrefix, Locator
 if TYPE_CHECKING:
     from muros.rtps._domain import DomainCore
 
-__all__ = ["Others"]
+__all__ = ["Kin", "Others"]
 
 OVERTAKEN: Final = 2 * SECOND
 """For so long an announcement may be on its way that was overtaken by a newer one, or by a farewell."""
@@ -43,6 +43,14 @@ LOOK_AGAIN: Final = 100 * MILLISECOND
 PREFIX_SIZE: Final = 12
 
 
+class Kin(NamedTuple):
+    """Participants of one other process of this kind."""
+
+    size: int
+    """Bytes of discovery that go there together."""
+    peers: list[Peer]
+
+
 class Others:
     """`peers`: those that are there."""
 
@@ -51,8 +59,8 @@ class Others:
     def __init__(self, home: "DomainCore") -> None:
         self._home = home
         self.peers: Final[dict[GuidPrefix, Peer]] = {}
-        self.kin: dict[Locator, int] = {}
-        """Where those of them listen that are of this kind, and how many bytes of discovery go there together."""
+        self.kin: dict[Locator, Kin] = {}
+        """Where those of them listen that are of this kind."""
         self._gone: dict[GuidPrefix, tuple[int, int]] = {}
         self._look_at = 0
 
@@ -94,6 +102,11 @@ class Others:
             self._locate(peer)
             for participant in self._home.participants:
                 participant.update(peer, None, now)
+
+    def neighbours(self, peer: Peer) -> list[Peer]:
+        """The participants of its process, itself included, the oldest first; nobody when it is not of this kind."""
+        at = self.kin.get(peer.discovery[0]) if peer.kin and peer.discovery else None
+        return [] if at is None else at.peers
 
     def lose(self, peer: Peer, why: Why, now: int) -> None:
         """One is there no more."""
@@ -173,12 +186,14 @@ class Others:
 
     def _find_kin(self) -> None:
         hosts = self._home.hosts
-        self.kin = {
-            place: SIZE_HERE if hosts.has(place) else SIZE
-            for peer in self.peers.values()
-            if peer.kin
-            for place in peer.discovery
-        }
+        self.kin = {}
+        for peer in self.peers.values():
+            if peer.kin:
+                for place in peer.discovery:
+                    at = self.kin.get(place)
+                    if at is None:
+                        at = self.kin[place] = Kin(SIZE_HERE if hosts.has(place) else SIZE, [])
+                    at.peers.append(peer)
 
     def _departed(self, guid: Guid, event: Data, now: int) -> None:
         prefix = event.source

@@ -92,7 +92,9 @@ class ParticipantCore:
             home.number,
             now,
         )
-        self._welcome = Welcome(self._announcer, home.agenda, self._discovery.is_heard_by)
+        self._welcome = Welcome(
+            self._announcer, home.agenda, self._discovery.is_heard_by, home.others.neighbours
+        )
         self._automatic = Assertions(False, home.agenda, self._discovery.say_alive)
         self._manual = Assertions(True, home.agenda, self._discovery.say_alive)
 

@@ -1,11 +1,12 @@
-"""What a writer knows of one matched reader (DDSI-RTPS 2.3, 8.4.7.2)."""
+"""What a writer knows of its matched readers (DDSI-RTPS 2.3, 8.4.7.2)."""
 
+from collections import Counter
 from collections.abc import Iterable
 
 from muros.rtps._endpoint import NEVER, Place
 from muros.rtps._values import EntityId, Guid, GuidPrefix, guid_of
 
-__all__ = ["ReaderProxy"]
+__all__ = ["Audience", "ReaderProxy"]
 
 
 class ReaderProxy:
@@ -59,3 +60,52 @@ class ReaderProxy:
     def guid(self) -> Guid:
         """The reader's GUID."""
         return guid_of(self.prefix, self.entity)
+
+
+class Audience:
+    """All matched readers of a writer, and where they are. With hundreds of them, one more costs what the first did."""
+
+    __slots__ = ("_at", "proxies", "reliable", "routes", "with_qos")
+
+    def __init__(self) -> None:
+        self.proxies: dict[tuple[GuidPrefix, EntityId], ReaderProxy] = {}
+        self.routes: tuple[Place, ...] = ()
+        """Every place where a reader listens, once."""
+        self.reliable = 0
+        """How many are reliable ..."""
+        self.with_qos = 0
+        """... and how many want the endpoint's QoS with every sample."""
+        self._at: Counter[tuple[Place, ...]] = Counter()
+
+    def add(self, proxy: ReaderProxy) -> None:
+        """One more."""
+        self.proxies[proxy.key] = proxy
+        self.reliable += proxy.reliable
+        self.with_qos += proxy.inline_qos
+        self._count(proxy.places, 1)
+
+    def drop(self, proxy: ReaderProxy) -> None:
+        """One less."""
+        del self.proxies[proxy.key]
+        self.reliable -= proxy.reliable
+        self.with_qos -= proxy.inline_qos
+        self._count(proxy.places, -1)
+
+    def move(self, proxy: ReaderProxy, places: tuple[Place, ...]) -> None:
+        """One is to be reached elsewhere."""
+        self._count(proxy.places, -1)
+        proxy.places = places
+        self._count(places, 1)
+
+    def at(self, places: tuple[Place, ...]) -> int:
+        """How many are to be reached there."""
+        return self._at[places]
+
+    def _count(self, places: tuple[Place, ...], change: int) -> None:
+        counts = self._at
+        counts[places] += change
+        if not counts[places]:
+            del counts[places]
+        elif counts[places] > 1 or change < 0:
+            return
+        self.routes = tuple(dict.fromkeys(place for those in counts for place in those))

@@ -85,6 +85,11 @@ class Window:
         self.ask = self.size // 2
         """From here on acknowledgement is to be asked for."""
 
+    @property
+    def awaits(self) -> bool:
+        """Whether acknowledgement was asked for that has not come."""
+        return bool(self._asked)
+
     def asked(self, number: int, now: int) -> None:
         """The sample `number`, the last one that left, asks for acknowledgement."""
         if not self._asked:

@@ -27,11 +27,11 @@ from muros.rtps._endpoint import NEVER, Place, Problem, Report, Send, newer, nex
 from muros.rtps._fragments import fragments_of
 from muros.rtps._history import Sample
 from muros.rtps._keeping import Keeper
-from muros.rtps._reader_proxy import ReaderProxy
+from muros.rtps._reader_proxy import Audience, ReaderProxy
 from muros.rtps._repairs import Repairs
 from muros.rtps._sending import OVERHEAD, WINDOW_LEAST, Allowance, Window, data_of, fragment_of, skips_of
 from muros.rtps._settings import WRITER_DEFAULTS, WriterSettings
-from muros.rtps._values import EntityId, Guid, GuidPrefix, split_guid
+from muros.rtps._values import Guid, split_guid
 from muros.rtps._wire import MAX_SUBMESSAGE, AckNack, NackFrag, info_dst, info_ts
 
 __all__ = ["WriterCore"]
@@ -72,10 +72,9 @@ class WriterCore:
     """
 
     __slots__ = (
-        "_allowance", "_ask_at", "_ask_every", "_beats", "_cursor", "_endpoint_qos", "_entity",
-        "_history", "_idle", "_keeper", "_lagging", "_leaving", "_proxies",
-        "_reliable", "_repair_at", "_repairs", "_report", "_routes", "_send", "_unasked", "_unsent",
-        "_window", "_with_qos", "due", "guid", "last", "reliable", "sent", "settings",
+        "_allowance", "_ask_at", "_ask_every", "_audience", "_beat_at", "_beats", "_cursor", "_endpoint_qos",
+        "_entity", "_history", "_idle", "_keeper", "_lagging", "_leaving", "_proxies", "_repair_at", "_repairs",
+        "_report", "_send", "_unasked", "_unsent", "_window", "due", "guid", "last", "reliable", "sent", "settings",
     )  # fmt: skip
 
     def __init__(
@@ -104,9 +103,8 @@ class WriterCore:
         self._send = send
         self._report = report
         self._endpoint_qos = endpoint_qos
-        self._with_qos = False
-        self._proxies: dict[tuple[GuidPrefix, EntityId], ReaderProxy] = {}
-        self._reliable = 0  # how many of them are reliable
+        self._audience = Audience()
+        self._proxies = self._audience.proxies
         self._idle: dict[ReaderProxy, None] = {}  # those that have everything
         self._lagging: dict[ReaderProxy, None] = {}  # those that do not
         self._keeper = Keeper(
@@ -119,7 +117,6 @@ class WriterCore:
             on_room=on_room,
         )
         self._history = self._keeper.history
-        self._routes: tuple[Place, ...] = ()  # every place where a reader listens, once
         self._unsent: list[int] = []  # samples waiting to leave
         self._leaving: Sample | None = None  # the first of them, when part of it has left:
         self._cursor = 0  # so many of its fragments
@@ -134,12 +131,13 @@ class WriterCore:
             settings.hold_off,
             together=settings.together > 0,
         )
-        self._beats = Beats(self._entity, send, self._keeper, self._proxies)
+        self._beats = Beats(self._entity, send, self._keeper, self._audience)
         self._ask_at = 0
         kept = settings.limit if depth is None else max(depth, ASK_LEAST * 4)
         self._ask_every = max(1, min(ASK_MOST, kept // 4))
         self._unasked = 0
         self._repair_at = NEVER
+        self._beat_at = NEVER  # or earlier than it need be
         self.due = NEVER
         """When `tick` is needed next, `NEVER` = not before something else happens."""
 
@@ -193,8 +191,8 @@ class WriterCore:
         key = split_guid(reader)
         proxy = self._proxies.get(key)
         if proxy is not None:
-            before, proxy.places = proxy.places, tuple(places)
-            self._reroute()
+            before = proxy.places
+            self._audience.move(proxy, tuple(places))
             if proxy.reliable and proxy.places != before:
                 self._beats.send(proxy, self.sent, final=False)
             return
@@ -202,10 +200,10 @@ class WriterCore:
         if self._keeper.retains and reliable and transient_local:
             self._keeper.expire(now)
             start = self._lowest()
-        proxy = self._proxies[key] = ReaderProxy(*key, tuple(places), self.reliable and reliable, start)
+        proxy = ReaderProxy(*key, tuple(places), self.reliable and reliable, start)
         proxy.inline_qos = expects_inline_qos
         proxy.patient = patient and self.settings.together > 0
-        self._reroute()
+        self._audience.add(proxy)
         if proxy.reliable:
             lags = proxy.acked < self.sent
             if lags:
@@ -220,16 +218,16 @@ class WriterCore:
 
     def unmatch(self, reader: Guid, now: int) -> None:
         """The reader has gone or no longer fits; nothing happens when it is not matched."""
-        proxy = self._proxies.pop(split_guid(reader), None)
+        proxy = self._proxies.get(split_guid(reader))
         if proxy is None:
             return
         self._idle.pop(proxy, None)
-        self._lagging.pop(proxy, None)
+        self._lags_no_more(proxy)
         self._repairs.drop(proxy)
-        self._reroute()
+        self._audience.drop(proxy)
         if not self._lagging:
             self._window.reset(now)
-        if not self._routes:
+        if not self._audience.routes:
             self._unsent.clear()
             self._leaving = None
             self._cursor = 0
@@ -260,7 +258,7 @@ class WriterCore:
         settings = self.settings
         stamp = info_ts(source_time)
         qos = inline_qos
-        if self._with_qos:
+        if self._endpoint_qos and self._audience.with_qos:
             qos = inline_qos[:-SENTINEL_SIZE] + self._endpoint_qos
         sequence = self.last + 1
         pieces = payload if isinstance(payload, tuple) else (payload,)
@@ -273,14 +271,14 @@ class WriterCore:
             if sample.to not in self._proxies:
                 raise ValueError(f"reader {to.hex()} is not matched")
         keeper = self._keeper
-        if self._reliable or keeper.retains or self._unsent or (self._routes and not whole):
+        if self._audience.reliable or keeper.retains or self._unsent or (self._audience.routes and not whole):
             if not keeper.add(sample, self.sent, now):
                 self.due = min(self.due, keeper.patience_ends())
                 return None
             if sample.expires < self.due:
                 self.due = sample.expires
         self.last = sequence
-        if not self._routes:
+        if not self._audience.routes:
             self.sent = sequence
         elif self._unsent or not whole or (self._window.out >= self._window.end and self._paces(sample)):
             self._unsent.append(sequence)
@@ -319,10 +317,10 @@ class WriterCore:
             # two such sides would not come to rest.
             self._beats.send(proxy, self.sent, final=proxy in self._idle or not (progress or is_first))
         if progress:
-            if self._lagging:
-                self._window.acknowledged(self.acknowledged, now)
-            else:
+            if not self._lagging:
                 self._window.completed(now)
+            elif self._window.awaits:
+                self._window.acknowledged(self.acknowledged, now)
             self._adapt()
             if self._unsent:
                 self._pump(now)
@@ -348,7 +346,7 @@ class WriterCore:
     def assert_liveliness(self, now: int) -> None:
         """Say that a writer with manual liveliness is alive (8.3.7.5: HEARTBEAT with the liveliness flag)."""
         beat = self._beats.for_all(self.sent, final=True, alive=True)
-        for place in self._routes:
+        for place in self._audience.routes:
             self._send([beat], None, place)
 
     def tick(self, now: int) -> int | None:
@@ -356,12 +354,10 @@ class WriterCore:
         self._pump(now)
         self._repair(now)
         expires = self._keeper.expire(now)
-        due = [proxy for proxy in self._lagging if proxy.due <= now]
-        if due:
-            self._beat(due, now)
+        if self._beat_at <= now:
+            self._beat(now)
         self._keeper.retry(self.sent, now)
-        self.due = min((proxy.due for proxy in self._lagging), default=NEVER)
-        self.due = min(self.due, expires, self._repair_at, self._keeper.patience_ends())
+        self.due = min(self._beat_at, expires, self._repair_at, self._keeper.patience_ends())
         if self._unsent:
             self.due = min(self.due, now + self.settings.pace)
         return self.deadline
@@ -375,10 +371,10 @@ class WriterCore:
             return
         self.sent = sample.sequence
         submessages = [sample.stamp, *data_of(sample, ENTITYID_UNKNOWN, self._entity)]
-        if self._reliable:
+        if self._audience.reliable:
             submessages += self._expect_and_ask(sample.size, now)
         send = self._send
-        for place in self._routes:
+        for place in self._audience.routes:
             send(submessages, None, place)
 
     def _transmit_to(self, sample: Sample, now: int) -> None:
@@ -426,7 +422,7 @@ class WriterCore:
 
     def _pump_fragments(self, sample: Sample, now: int) -> bool:
         """Send what has not been sent of a large sample; False when the allowance is used up before its end."""
-        reader, prefix, places = ENTITYID_UNKNOWN, None, self._routes
+        reader, prefix, places = ENTITYID_UNKNOWN, None, self._audience.routes
         if sample.to is not None:
             proxy = self._proxies.get(sample.to)
             reader, prefix = sample.to[1], sample.to[0]
@@ -434,7 +430,7 @@ class WriterCore:
         window, size = self._window, self.settings.fragment_size
         total = fragments_of(sample.size, size)
         while self._cursor < total:
-            if not (self._reliable and window.out < window.end):
+            if not (self._audience.reliable and window.out < window.end):
                 if not self._may_send(now):
                     return False
                 self._allowance.spend(size * len(places))
@@ -443,7 +439,7 @@ class WriterCore:
             submessages = [sample.stamp, content]
             if self._cursor == total:
                 self.sent = sample.sequence
-                if self._reliable:
+                if self._audience.reliable:
                     self._expect(now)
                     submessages.append(self._ask(now))
             window.out += size
@@ -477,7 +473,7 @@ class WriterCore:
 
         Small ones of a writer that keeps few had better leave at once, for newer ones would push them out.
         """
-        return bool(self._reliable) and (self._history.depth is None or sample.size >= LARGE)
+        return bool(self._audience.reliable) and (self._history.depth is None or sample.size >= LARGE)
 
     def _may_begin(self, sample: Sample, now: int) -> bool:
         """Whether one more sample may leave: as reliable readers keep up."""
@@ -499,7 +495,7 @@ class WriterCore:
 
     def _expect_and_ask(self, size: int, now: int) -> list[bytes]:
         """A sample of `size` bytes leaves: if reliable readers get it, acknowledgement may be asked for with it."""
-        if not self._reliable:
+        if not self._audience.reliable:
             return []
         if self._idle:
             self._expect(now)
@@ -520,13 +516,15 @@ class WriterCore:
     def _asking_heartbeat(self, proxy: ReaderProxy) -> bytes:
         return self._beats.for_one(proxy, self.sent)
 
-    def _beat(self, due: list[ReaderProxy], now: int) -> None:
-        """Ask lagging readers for acknowledgement."""
+    def _beat(self, now: int) -> None:
+        """Ask lagging readers for acknowledgement whose time has come."""
+        due = [proxy for proxy in self._lagging if proxy.due <= now]
         for proxy in due:
             proxy.interval = min(proxy.interval * 2, self.settings.heartbeat_slowest)
             proxy.due = now + proxy.interval
         self._beats.ask([proxy for proxy in due if not proxy.patient], self.sent)
         self._beats.ask_together([proxy for proxy in due if proxy.patient], self.sent)
+        self._beat_at = min((proxy.due for proxy in self._lagging), default=NEVER)
 
     # --- Readers -----------------------------------------------------------------------------------------
 
@@ -542,7 +540,13 @@ class WriterCore:
         proxy.interval = self.settings.heartbeat_period
         proxy.due = now + proxy.interval
         self._lagging[proxy] = None
+        self._beat_at = min(self._beat_at, proxy.due)
         self.due = min(self.due, proxy.due)
+
+    def _lags_no_more(self, proxy: ReaderProxy) -> None:
+        self._lagging.pop(proxy, None)
+        if not self._lagging:
+            self._beat_at = NEVER
 
     def _advance(self, proxy: ReaderProxy, acked: int, now: int) -> None:
         """A reader has more than before."""
@@ -553,7 +557,7 @@ class WriterCore:
         for number in [number for number in proxy.wanted if number <= acked]:
             del proxy.wanted[number]
         if acked == self.sent:
-            self._lagging.pop(proxy, None)
+            self._lags_no_more(proxy)
             self._repairs.drop(proxy)
             proxy.due = NEVER
             self._idle[proxy] = None
@@ -568,13 +572,6 @@ class WriterCore:
     def _adapt(self) -> None:
         """What may leave beside the window goes by what the readers have shown to take."""
         self._allowance.burst = min(self.settings.burst, max(self._window.size, WINDOW_LEAST))
-
-    def _reroute(self) -> None:
-        """The readers have changed: gather what is asked of all of them for every sample."""
-        proxies = self._proxies.values()
-        self._routes = tuple(dict.fromkeys(place for proxy in proxies for place in proxy.places))
-        self._reliable = sum(proxy.reliable for proxy in proxies)
-        self._with_qos = bool(self._endpoint_qos) and any(proxy.inline_qos for proxy in proxies)
 
     def _lowest(self) -> int:
         return self._keeper.lowest(self.sent)
