@@ -26,7 +26,7 @@ __all__ = ["Ros1Node"]
 
 RETRY = 1.0
 """Seconds between attempts to reach the master."""
-WATCH = 3.0
+WATCH = 5.0
 """Seconds between looks at whether the master is still the same."""
 GREETING = 10.0
 """Seconds that a connection may take to send its header."""
