@@ -186,16 +186,17 @@ class ExecutorThread:
         except (OSError, AttributeError):  # it has ended just now; a system that does not tell
             return self._spent
 
-    def claim(self) -> None:
+    def prepare(self) -> None:
         """Makes sure that what the executor runs belongs to this thread, however it was added; used by ``Threads``."""
         for handle in self.executor.handles:
             self._owner.sharing.claim(handle, self._seat)
-
-    def start(self) -> None:
-        """Begins; used by ``Threads``."""
-        self._seat.ending = self.ended = False
+        self._seat.ending = False
         self.error = None
         self._settled.clear()
+
+    def start(self) -> None:
+        """Begins, unless it is to end already; used by ``Threads``."""
+        self.ended = False
         self._thread = threading.Thread(target=self._run, name=f"muros {self.name}", daemon=True)
         self._thread.start()
 
@@ -317,7 +318,6 @@ class Threads:
                 )
         for thread in self.threads:
             thread.policy = thread.policy or _policy_of(thread.groups)
-            thread.claim()
         policies = [thread.policy for thread in self.threads if thread.policy is not None]
         urgent = [policy for policy in policies if policy.real_time]
         said: list[str] = []
@@ -327,8 +327,10 @@ class Threads:
             said.append(scheduling.apply(_above(urgent)))
             settled.set()
 
-        self.sharing.start(prepare, self._carrier_failed)
         self._failures.clear()
+        for thread in self.threads:
+            thread.prepare()
+        self.sharing.start(prepare, self._carrier_failed)
         self._started = True
         if urgent and self.switch_interval is not None:
             self._hurries = True
