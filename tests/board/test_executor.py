@@ -342,6 +342,29 @@ def test_let_bounds_what_is_published() -> None:
     assert bench.written() == [0, 1, 2]
 
 
+def test_let_holds_back_no_log() -> None:
+    bench = Bench()
+    log = bench.node.publisher(Number, "rosout")
+    out = bench.node.publisher(Number, "out")
+    said: "list[list[int]]" = []
+
+    def call() -> None:
+        for i in range(2):
+            assert log.publish(number(i + 10))
+        assert out.publish(number(1))
+        said.append(bench.written())
+
+    executor = bench.executor(semantics=_LET, period=0.01, messages=1)
+    timer = bench.node.timer(0, call)
+    executor.add(timer)
+    bench.connect()
+    executor.spin_one_period()
+    timer.cancel()
+    executor.spin_one_period()
+    assert said == [[10, 11]]
+    assert bench.written() == [1]
+
+
 def test_let_answers_and_requests_leave_at_the_end() -> None:
     bench = Bench()
     service = bench.node.service(Service, "add", lambda request: number(request.data + 1))

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import muros.rclc
+from muros.interfaces import message as message_class
 from muros.rclc import (
     ALWAYS,
     CANCEL_CURRENT,
@@ -223,6 +224,29 @@ def test_a_request_that_nobody_takes_has_no_answer(local: InSpace) -> None:
     executor.spin_one_period()
     assert got == [None]
     assert executor.tasks[0].lost == 1
+
+
+def test_what_is_logged_is_no_output(local: InSpace) -> None:
+    """However much a callback says, it is said at once."""
+    seen: list[tuple[int, str]] = []
+    log = message_class("rcl_interfaces/msg/Log")
+    local.talker.node("console").subscription(
+        log, "/rosout", lambda m: seen.append((local.now - start, m.msg)), "rosout"
+    )
+    node = local.context.node("node")
+    logger = node.logger(show=None)
+    listening = Executor(local.talker)
+
+    def call() -> None:
+        for i in range(30):
+            assert logger.info(f"line {i}")
+            listening.spin_some()
+
+    executor = local.executor(semantics=LET, period=0.01)
+    executor.add(node.timer(0, call))
+    start = local.now
+    executor.spin_one_period()
+    assert seen == [(0, f"line {i}") for i in range(30)]
 
 
 def test_a_let_of_several_periods(local: InSpace) -> None:

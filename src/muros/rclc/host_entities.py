@@ -12,7 +12,7 @@ from muros.rclc import service as service_
 from muros.rclc.errors import RclError
 from muros.rclc.host_checks import WrongTypeError, be_callable, called, fits, other
 from muros.rclc.host_waiting import wait_confirmed
-from muros.rclc.outlet import body, outlet
+from muros.rclc.outlet import LOG_TOPIC, body, outlet
 from muros.rclc.sharing import call_elsewhere, hand_over
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class Publisher:
         """
         if not isinstance(message, self._kind) and not fits(message, self._kind):
             raise other(message, self._kind, "publish")
-        if outlet.task is not None:
+        if outlet.task is not None and self.topic != LOG_TOPIC:
             return outlet.task.publish(self._writer, message)
         taken = self._writer.publish(message)
         if timeout is None:

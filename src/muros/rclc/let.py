@@ -265,18 +265,18 @@ class Outputs:
         self.session = session
         self.items: "list[Any]" = []
         self._task: "Any" = None
+        self._backlog: "Any" = None
 
-    def open(self, task: Task) -> "Any":
+    def open(self, task: Task) -> None:
         """From now on everything is held back."""
         self._task = task
-        backlog = self.session.backlog
+        self._backlog = self.session.backlog
         self.session.backlog = self
-        return backlog
 
-    def close(self, backlog: "Any") -> None:
+    def close(self, outer: object) -> None:
         """No more."""
         session = self.session
-        session.backlog = backlog
+        session.backlog = self._backlog
         if self.items:
             backlog = borrow("muros.client.requests").keep(session)
             backlog.items += self.items
@@ -285,6 +285,12 @@ class Outputs:
 
     def defer(self, writer: "Any", message: "Any", n: int) -> bool:
         """Takes a sample. CapacityError when the writer has published too many."""
+        if writer.name == "rt/rosout":  # what is logged is no output
+            self.session.backlog = self._backlog
+            taken: bool = writer.publish(message)
+            self._backlog = self.session.backlog
+            self.session.backlog = self
+            return taken
         task = self._task
         count = 0
         for other in task.outputs:

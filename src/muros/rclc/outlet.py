@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from muros.rclc.host_let import HostTask
 
 
+LOG_TOPIC = "/rosout"
+"""What is logged is no output: it leaves at once."""
+
+
 class Outlet(threading.local):
     """What each thread has of its own."""
 
