@@ -842,3 +842,17 @@ def test_ids_that_are_given_anew_never_carry_another_topic() -> None:
         scene.step(5)
         for name, topic_id in turned.items():
             assert board.taken(topic_id) == [string(name)]
+
+
+def test_a_board_that_restarts_and_logs_all_the_time_is_asked_again_too() -> None:
+    """Logs are sent by boards that nobody has asked for topics, so they prove nothing."""
+    scene = Scene()
+    board, _, _ = led_board(scene)
+    scene.step(1_000)
+    board.boot()
+    start = scene.now
+    while not board.connected:
+        board.log(1, "still waiting")
+        scene.step(50)
+        assert scene.now - start <= 1_300
+    assert len(scene.said(BoardReset)) == 1

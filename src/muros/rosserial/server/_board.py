@@ -4,10 +4,11 @@ A board says nothing until it is asked for its topics; then it asks for the time
 itself as connected for as long as its requests for the time are answered. There is no end mark, no acknowledgement,
 and no sign of a restart. So the server goes by these:
 
-- Any good frame is a sign of life. A board that has asked for the time before and is silent longer than it takes
-  until it must ask again is asked for its topics once a second.
+- Any good frame is a sign of life, messages and requests for the time are signs of a connected board. One that has
+  asked for the time before, and shows none longer than it takes until it must ask again, is asked for its topics once a
+  second.
 - A connected board passes over the two bytes ``FF 00``; an unconnected one answers with a request for the time, to show
-  which version it speaks. While a board sends nothing it gets them twice a second, and a request for the time that
+  which version it speaks. While a board shows no sign it gets them twice a second, and a request for the time that
   is not due means that it has started again.
 - A frame of an unknown topic means that something was lost, or that the board has started again with other topics.
 - Topics that stay unnamed after two requests are gone; damage on the line while they are named brings another request.
@@ -147,6 +148,8 @@ class Board:
         """The board's buffer for what it is sent; 0 until it was announced."""
         self.output_buffer = 0
         self.heard_at = 0
+        self.connected_at = 0
+        """When it last sent something that only a connected board sends; logs and questions come from others, too."""
         self.last_time: int | None = None
         self.lost_at: int | None = None
         self.due: int | None = None
@@ -197,7 +200,7 @@ class Board:
         self.input_buffer = self.output_buffer = 0
         self.last_time = None
         self._open_asks.clear()
-        self._first_ask = self.heard_at = now
+        self._first_ask = self.heard_at = self.connected_at = now
         self._told_ready = False
         self.roster.restart()
         self.suspicions.begin(now)
@@ -302,9 +305,9 @@ class Board:
             if self._settle_at is not None:
                 self.wake(self._settle_at)
             if self.last_time is not None:
-                self.wake(self.heard_at + limits.silent)
+                self.wake(self.connected_at + limits.silent)
                 if limits.check and self.version == VERSION_HYDRO:
-                    self.wake(max(self.heard_at + _CHECK_AFTER, self._checked_at + limits.check))
+                    self.wake(max(self.connected_at + _CHECK_AFTER, self._checked_at + limits.check))
         if self.lost_at is not None:
             self.wake(self.lost_at + limits.keep_lost)
 
@@ -314,7 +317,7 @@ class Board:
             self._settled(now)
         if self.last_time is None:
             return  # it never asks for the time: its silence means nothing
-        silence = now - self.heard_at
+        silence = now - self.connected_at
         if silence >= limits.silent:
             self._step(SILENCE)
             self._ask(now)
@@ -432,13 +435,11 @@ class Board:
         self.heard_at = now
         receive = self._incoming.get(topic_id)
         if receive is not None:
+            self.connected_at = now
             if self.state == SILENT:
                 self._heard_again(now)
                 self._step(ANSWER)
             return receive(bytes(memoryview(buf)[off : off + n]), now)
-        if self.state == SILENT and topic_id != ID_TIME:
-            self._heard_again(now)
-            self._step(ANSWER)
         try:
             return self._protocol(topic_id, buf, off, n, now)
         except MessageError as error:
@@ -486,7 +487,7 @@ class Board:
         write_time(body, 0, stamp // 1_000_000_000 & 0xFFFFFFFF, stamp % 1_000_000_000)
         self.output.post(frame(ID_TIME, body, self.version))
         self.pump(now)
-        last, self.last_time = self.last_time, now
+        last, self.last_time, self.connected_at = self.last_time, now, now
         if (
             self.state == SYNCED
             and not self._open_asks
@@ -506,6 +507,7 @@ class Board:
     def _named(self, half: int, info: TopicInfo, now: int) -> None:
         """The board names a topic, or one half of a service."""
         self._answered_topics(now)
+        self.connected_at = now
         if half in (ID_SUBSCRIBER, ID_SERVICE_SERVER + 1, ID_SERVICE_CLIENT + 1):
             if not self.input_buffer:
                 self.core.tell(BufferKnown(self.label, "subscribe", info.buffer_size))

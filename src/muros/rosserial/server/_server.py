@@ -221,10 +221,10 @@ class Server:
         serial: Any = link
         baud = serial.baud_of(address.device)
         at = BAUDS.index(baud) + 1 if baud in BAUDS else 0
-        try:
-            serial.set_baud(address.device, BAUDS[at % len(BAUDS)])
-        except LinkError:
-            return False
+        for other in (*BAUDS[at:], *BAUDS[:at]):
+            with suppress(LinkError):  # this port may not have all of them
+                serial.set_baud(address.device, other)
+                break
         board.set_baud(self._adapters[serial].port.identify(address).baud)
         return True
 
