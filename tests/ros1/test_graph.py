@@ -221,6 +221,19 @@ def test_a_new_master_is_told_everything() -> None:
     asyncio.run(main())
 
 
+def test_a_node_that_is_told_to_end_leaves(master: Master, ros: Peer) -> None:
+    async def main() -> None:
+        async with station(master) as node:
+            node.publish("/up", *STRING)
+            assert "/muros" in str(await ros.ask("state", publishers=["/up"]))
+            assert await call(node.uri, "shutdown", "/rosnode", "user request") == 0
+            assert await ros.ask("gone", node="/muros")
+            assert [report[0] for report in node.reports] == ["ros1-shutdown"]
+            node.publish("/later", *STRING).publish(text("to nobody"))
+
+    asyncio.run(main())
+
+
 def test_a_name_is_had_once(master: Master) -> None:
     async def main() -> None:
         async with station(master) as node:

@@ -28,6 +28,8 @@ RETRY = 1.0
 """Seconds between attempts to reach the master."""
 WATCH = 5.0
 """Seconds between looks at whether the master is still the same."""
+LEAVE = 0.1
+"""Seconds from being told to end until it does, so that whoever told it has its answer."""
 GREETING = 10.0
 """Seconds that a connection may take to send its header."""
 
@@ -45,7 +47,8 @@ class _Entry:
 
 
 class Ros1Node:
-    """A node called ``name``. ``open`` it in a running event loop before anything else.
+    """A node called ``name``. ``open`` it in a running event loop before anything else. Told to end by the graph, as
+    when a node of the same name appears, it leaves.
 
     ``master`` is the master's address (default ``$ROS_MASTER_URI``), ``host`` the name or address that others reach
     this machine by (default ``$ROS_HOSTNAME``, ``$ROS_IP``, or the interface that leads to the master).
@@ -88,6 +91,7 @@ class Ros1Node:
         self._master_pid = 0
         self._on_parameter_update: Callable[[str, Any], object] | None = None
         self._ended = False
+        self._leaving: asyncio.Task[None] | None = None
 
     async def open(self) -> None:
         """Listens for other nodes; from now on the master is told. Raises OSError."""
@@ -102,6 +106,8 @@ class Ros1Node:
     async def close(self) -> None:
         """Takes everything out of the graph; the master is told if it answers."""
         if self._ended:
+            if self._leaving is not None and self._leaving is not asyncio.current_task():
+                await self._leaving
             return
         self._ended = True
         for task in self._tasks:
@@ -305,9 +311,14 @@ class Ros1Node:
                 "ros1-shutdown",
                 f"the ROS 1 graph wants node {self.name} to end",
                 reason or "no reason is given",
-                "Two nodes of one name throw each other out: give one another name",
+                "It has left. Two nodes of one name throw each other out: give one another name",
             )
+            asyncio.get_running_loop().call_later(LEAVE, self._leave)
         return 0
+
+    def _leave(self) -> None:
+        if not self._ended:
+            self._leaving = asyncio.get_running_loop().create_task(self.close())
 
     def _accept(self) -> Connection:
         connection = Connection(self._greet, self._greeting.discard)
