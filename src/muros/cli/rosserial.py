@@ -64,7 +64,7 @@ def run(argv: Sequence[str]) -> int:
 async def _serve(options: Options, parameters: Callable[[str], Mapping[str, Any]]) -> None:
     log = Log(sys.stdout, RosserialStyle(), verbose=options.verbose)
     findings = Findings()
-    early: list[Event | Finding] = []
+    early: list[Event | Finding | Message] = []
     unwatch = [findings.on_finding(early.append)]
     full = "/".join(
         ["", *filter(None, [options.namespace.strip("/"), (options.name or NODE_NAME).strip("/")])]
@@ -92,7 +92,8 @@ async def _serve(options: Options, parameters: Callable[[str], Mapping[str, Any]
             parameters=parameters,
         )
         unwatch.append(server.on_event(early.append))
-        links = _add_links(server, options, full, log)
+        show: list[Callable[[Message], object]] = [early.append]
+        links = _add_links(server, options, full, lambda message: show[0](message))
         await server.start()
         try:
             # The banner comes first: only open links know their ports.
@@ -110,8 +111,11 @@ async def _serve(options: Options, parameters: Callable[[str], Mapping[str, Any]
             for each in early:
                 if isinstance(each, Finding):
                     log.finding(each)
+                elif isinstance(each, Message):
+                    log.message(each)
                 else:
                     log.event(each)
+            show[0] = log.message
             server.on_event(log.event)
             server.on_finding(log.finding)
             await stop.wait()
@@ -125,11 +129,11 @@ async def _serve(options: Options, parameters: Callable[[str], Mapping[str, Any]
             await world.close()
 
 
-def _add_links(server: Server, options: Options, full: str, log: Log) -> list[Link]:
+def _add_links(server: Server, options: Options, full: str, show: Callable[[Message], object]) -> list[Link]:
     """The lines that are asked for. A single port has the node's name for itself."""
 
     def on_message(link: Link, incoming: bool, data: bytes, address: Address) -> None:
-        log.message(Message(link.name, link.describe(address), incoming, data))
+        show(Message(link.name, link.describe(address), incoming, data))
 
     def watched(link: Link) -> Link:
         return Tap(link, on_message) if options.verbose >= DEBUG else link

@@ -100,6 +100,7 @@ class Server:
         self._ticking = False
         self._closed: asyncio.Event | None = None
         self._ended = False
+        self._told = False
 
     def add_serial(
         self, devices: str | Sequence[str], baud: int | None = BAUD, *, name: str | None = None
@@ -184,6 +185,7 @@ class Server:
         """Tells every board that nobody listens any more, waits until that has left, and closes."""
         if not self._ended and self._loop is not None:
             self.core.stop()
+            self._told = True
             with suppress(asyncio.CancelledError):
                 await asyncio.sleep(_GOODBYE_S)
         self.close()
@@ -193,7 +195,8 @@ class Server:
         if self._ended:
             return
         self._ended = True
-        self.core.stop()
+        if not self._told:
+            self.core.stop()
         self._stop()
         for board in list(self.core.boards):
             self.core.remove(board, "the server stops")
