@@ -29,5 +29,5 @@ def send() -> None:
         print("Sent joints:", len(message.name))
 
 
-node.timer(0.5, send)
+node.timer(0.2, send)
 Executor(context).spin()

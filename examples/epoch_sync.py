@@ -37,5 +37,5 @@ def date(days: int) -> "tuple[int, int, int]":
     return year + era * 400 + (month > 9), month + 3 - 12 * (month > 9), day - (153 * month + 2) // 5 + 1
 
 
-node.timer(0.5, tell)
+node.timer(0.2, tell)
 Executor(context).spin()

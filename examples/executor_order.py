@@ -29,7 +29,7 @@ def publish() -> None:
 
 
 executor = Executor(context, handles=3)
-executor.add(node.timer(0.5, publish))
+executor.add(node.timer(0.2, publish))
 executor.add(first)
 executor.add(second)
 executor.spin()

@@ -30,5 +30,5 @@ def publish() -> None:
 
 
 node.subscription(String, "topic_0", lambda message: print("Callback: I heard:", message.data))
-node.timer(0.5, publish)
+node.timer(0.2, publish)
 Executor(context).spin()

@@ -25,7 +25,7 @@ class Counter:
         self.message = Int32(data=0)
         node = context.node("counter", namespace=namespace)
         self.publisher = node.publisher(Int32, "int32")
-        node.timer(0.5, self.send)
+        node.timer(0.2, self.send)
 
     def send(self) -> None:
         """Publishes the number."""

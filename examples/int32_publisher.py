@@ -28,5 +28,5 @@ def send() -> None:
         message.data += 1
 
 
-node.timer(0.5, send)
+node.timer(0.2, send)
 Executor(context).spin()

@@ -28,5 +28,5 @@ def send() -> None:
 
 
 node.subscription(Int32, "int32", lambda heard: print("Received:", heard.data))
-node.timer(0.5, send)
+node.timer(0.2, send)
 Executor(context).spin()

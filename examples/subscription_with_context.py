@@ -42,5 +42,5 @@ def drive() -> None:
         wheel.publisher.publish(Int32(data=1))
 
 
-node.timer(0.5, drive)
+node.timer(0.2, drive)
 Executor(context).spin()
