@@ -166,3 +166,12 @@ def test_texts() -> None:
     assert Text("abc").capacity == 4
     with raises(CapacityError):
         arena.take(5)
+
+
+def test_a_flood_is_told_now_and_then() -> None:
+    rig = Rig(Rules(strings=3))
+    data = body("abcd", [], 0)
+    for _ in range(40):
+        rig.hear(data)
+    assert rig.subscription.refused == 40
+    assert len(rig.problems) == 6  # 1, 2, 4, 8, 16, 32

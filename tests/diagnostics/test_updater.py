@@ -214,16 +214,28 @@ def test_a_task_that_raises_does_not_stop_the_others(stage: Stage) -> None:
     assert [(status.updater_id, status.level) for status in board.update()] == [(1, OK)]
 
 
-@pytest.mark.parametrize("value", [2**31, -(2**31) - 1, "text", None])
-def test_values_that_are_none_are_failures_of_the_task(stage: Stage, value: Any) -> None:
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda task: task.set(0, 2**31),
+        lambda task: task.set(0, -(2**31) - 1),
+        lambda task: task.set(0, "text"),
+        lambda task: task.set(0, None),
+        lambda task: task.set(65536, 1),
+        lambda task: task.lookup(0, -1),
+    ],
+)
+def test_values_that_are_none_are_failures_of_the_task(stage: Stage, wrong: Any) -> None:
     board = Board(stage)
-    board.updater.task(1, 0, lambda task: task.set(0, value))
-    board.updater.task(70000, 0, nothing)
-    assert [status.level for status in board.update()] == [ERROR]
-    assert [text.split(" raised ")[0] for _, text in board.problems] == [
-        "diagnostic task 1",
-        "diagnostic task 70000",
-    ]
+    board.updater.task(1, 0, wrong)
+    assert [(status.level, status.values) for status in board.update()] == [(ERROR, [])]
+    assert [text.split(" raised ")[0] for _, text in board.problems] == ["diagnostic task 1"]
+
+
+@pytest.mark.parametrize("numbers", [(65536, 0), (0, -1)])
+def test_tasks_have_numbers_of_16_bits(stage: Stage, numbers: tuple[int, int]) -> None:
+    with pytest.raises(ValueError, match="is no number from 0 to 65535"):
+        Board(stage).updater.task(*numbers, nothing)
 
 
 def test_what_was_not_taken_is_sent_later(monkeypatch: pytest.MonkeyPatch) -> None:

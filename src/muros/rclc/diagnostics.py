@@ -38,6 +38,7 @@ _INT = const(2)
 _FLOAT = const(3)
 _LOOKUP = const(10)
 _LARGEST = const(0x7FFFFFFF)
+_LARGEST_ID = const(0xFFFF)
 
 
 class DiagnosticUpdater:
@@ -63,12 +64,17 @@ class DiagnosticUpdater:
         )
 
     def task(self, updater_id: int, hardware_id: int, check: "Callable[[Task], object]") -> "Task":
-        """A task: at each update ``check(task)`` sets its values. Raises CapacityError when there is no more room."""
+        """A task: at each update ``check(task)`` sets its values.
+
+        Raises CapacityError when there is no more room, ValueError for a number that has more than 16 bits.
+        """
         if len(self.tasks) >= self.most_tasks:
             raise CapacityError(
                 "the updater has %d tasks, its most: make it with tasks=%d"
                 % (len(self.tasks), len(self.tasks) + 1)
             )
+        _within(updater_id)
+        _within(hardware_id)
         made = Task(self, updater_id, hardware_id, check)
         self.tasks.append(made)
         return made
@@ -87,14 +93,11 @@ class DiagnosticUpdater:
             except Exception as error:
                 task.fail(error)
             if task.fresh:
-                try:
-                    if self._publish(task):
-                        task.fresh = False
-                        sent += 1
-                    else:
-                        self.refused += 1
-                except ValueError as error:  # a number that does not fit its field
-                    task.fail(error)
+                if self._publish(task):
+                    task.fresh = False
+                    sent += 1
+                else:
+                    self.refused += 1
         return sent
 
     def force(self) -> None:
@@ -116,7 +119,7 @@ class DiagnosticUpdater:
 
 
 class Task:
-    """Made by ``DiagnosticUpdater.task``. ``level`` is that of its worst value, ``failures`` counts what it has raised."""
+    """Made by ``DiagnosticUpdater.task``. ``level`` is that of its worst value; ``failures`` counts what was raised."""
 
     def __init__(
         self, updater: DiagnosticUpdater, updater_id: int, hardware_id: int, check: "Callable[[Task], object]"
@@ -133,7 +136,10 @@ class Task:
         self._level = OK
 
     def set(self, key: int, value: "bool | int | float", level: int = OK) -> None:
-        """Sets the next value. Raises CapacityError for one too many, ValueError beyond 32 bits."""
+        """Sets the next value.
+
+        Raises CapacityError for one too many, ValueError for an int of more than 32 bits or a key of more than 16.
+        """
         if isinstance(value, bool):
             self._put(key, _BOOL, level, value, 0, 0.0, 0)
         elif isinstance(value, int):
@@ -145,6 +151,7 @@ class Task:
 
     def lookup(self, key: int, value_id: int, level: int = OK) -> None:
         """Sets the next value to one that the bridge's table has words for."""
+        _within(value_id)
         self._put(key, _LOOKUP, level, False, 0, 0.0, value_id)
 
     def worsen(self, level: int) -> None:
@@ -185,6 +192,7 @@ class Task:
             raise CapacityError(
                 "a task has %d values, its most: make the updater with values=%d" % (at, at + 1)
             )
+        _within(key)
         if at == len(self.values):
             self.values.append(self.updater._value())
             self.fresh = True
@@ -205,6 +213,12 @@ class Task:
             found.bool_value, found.int_value, found.double_value, found.value_id = values
         self._count = at + 1
         self._level = max(self._level, level)
+
+
+def _within(number: int) -> None:
+    """Raises ValueError for what is no number of 16 bits; boards would cut it off."""
+    if not 0 <= number <= _LARGEST_ID:
+        raise ValueError("%d is no number from 0 to %d" % (number, _LARGEST_ID))
 
 
 def _kind(package: str, name: str) -> "Any":

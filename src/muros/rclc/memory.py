@@ -96,7 +96,7 @@ class Guard:
         subscription = self.subscription
         step = check(self.plan, self._stack, buf, off, n)
         if step != _FITS:
-            self._refuse(n, borrow("muros.rclc.memory_plan").path(self.kind, step))
+            self._refuse(n, step)
         elif not MPY:
             subscription.deliver(buf, off, n)
         else:
@@ -105,13 +105,16 @@ class Guard:
             try:
                 subscription.deliver(buf, off, n)
             except MemoryError:
-                self._refuse(n, "")
+                self._refuse(n, _FITS)
 
-    def _refuse(self, n: int, path: str) -> None:
+    def _refuse(self, n: int, step: int) -> None:
         count = self.subscription.refused + 1
         self.subscription.refused = count
-        if count & count - 1 == 0:  # the 1st, 2nd, 4th, 8th...
-            borrow("muros.rclc.memory_plan").tell(self, n, path)
+        if count & count - 1 == 0:  # the 1st, 2nd, 4th, 8th: a flood costs nothing
+            try:
+                borrow("muros.rclc.memory_plan").tell(self, n, step)
+            except MemoryError:
+                pass
 
 
 def check(plan: "list[int]", stack: "list[int]", buf: "Buffer", off: int, n: int) -> int:

@@ -129,13 +129,13 @@ def path(kind: "Any", step: int) -> str:
     return walker.path
 
 
-def tell(guard: "Guard", n: int, member: str) -> None:
-    """Tells of a refused sample."""
+def tell(guard: "Guard", n: int, step: int) -> None:
+    """Tells of a refused sample of ``n`` bytes, which broke a step of the plan; -1: there was no memory for it."""
     text = "%d B of %s dropped: " % (n, guard.kind.TYPE)
-    if member:
-        text += "%s is longer than the rules allow" % member
-    else:
+    if step < 0:
         text += "there is no memory for it"
+    else:
+        text += path(guard.kind, step) + " is longer than the rules allow"
     middleware = guard.subscription.context.middleware
     if middleware.on_problem is not None:
         middleware.on_problem(REFUSED, text)
