@@ -1,10 +1,30 @@
-"""Passes of boards' executors that call subscriptions without data, or go on after an error. Only those load it."""
+"""Passes of boards' executors that call subscriptions without data, or go on after an error, or with LET.
+
+Only those load it, and keep it.
+"""
 
 from muros.compat import const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
+
+
+def attach(executor: "Any") -> None:
+    """Has an executor make passes that call subscriptions without data, and decide about errors."""
+    executor.always = []
+    if not hasattr(executor, "on_error"):
+        executor.on_error = None
+    replace(executor, lambda now, due=False: work(executor, now, due))
+
+
+def replace(executor: "Any", work: "Any") -> None:
+    """Has an executor make passes of its own; those at the end of a wait, or of periods, are due without news too."""
+    executor.work = work
+    executor.beat = lambda now: work(now, True)
+    executor.round = lambda timeout: (
+        type(executor).round(executor, timeout) or work(executor.context.clock(), True)
+    )
 
 
 def work(executor: "Any", now: int, beat: bool) -> bool:

@@ -50,12 +50,12 @@ async def pause(executor: Executor, timeout: float) -> None:
     if timeout <= 0:
         await asyncio.sleep(0)
         return
-    loop = asyncio.get_running_loop()
-    came: Came = loop.create_future()
     middleware: Any = context.middleware
     if hasattr(middleware, "wait_async"):
         await middleware.wait_async(timeout)
         return
+    loop = asyncio.get_running_loop()
+    came: Came = loop.create_future()
     waiting = _waiting.setdefault(context, [])
     waiting.append((executor, came))
     try:

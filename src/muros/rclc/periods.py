@@ -24,18 +24,15 @@ def begin(executor: "Any", options: "dict[str, Any]") -> None:
     if options or overrun == _LOW_PRIORITY:
         raise ValueError("no board has executors with %s" % (", ".join(options) or "LOW_PRIORITY"))
     if semantics:
-        from muros.rclc.let import Let, Outputs
+        from muros.rclc.let import Let, attach
+        from muros.rclc.let_outputs import Outputs
 
-        middleware = executor.context.middleware
-        let = executor.let = Let(executor, executor.period, overrun, messages, Outputs(middleware))
-
-        def work(now: int, due: bool = False) -> bool:
-            middleware.spin_once(now)
-            return let.work(now, due)
-
-        _replace(executor, work)
+        outputs = Outputs(executor.context.middleware)
+        attach(executor, Let(executor, executor.period, overrun, messages, outputs))
     elif executor.on_error is not None:
-        _watch(executor)
+        from muros.rclc.always import attach as watch
+
+        watch(executor)
 
 
 def prepare(executor: "Any", handle: "Any", when: int, let: float, messages: int) -> None:
@@ -52,27 +49,10 @@ def prepare(executor: "Any", handle: "Any", when: int, let: float, messages: int
         task.messages = messages or own.messages
     elif when:
         if not hasattr(executor, "always"):
-            _watch(executor)
+            from muros.rclc.always import attach as watch
+
+            watch(executor)
         executor.always.append(handle)
-
-
-def _watch(executor: "Any") -> None:
-    """Has an executor make passes that call subscriptions without data, and decide about errors."""
-    from muros.rclc.always import work
-
-    executor.always = []
-    if not hasattr(executor, "on_error"):
-        executor.on_error = None
-    _replace(executor, lambda now, due=False: work(executor, now, due))
-
-
-def _replace(executor: "Any", work: "Any") -> None:
-    """Has an executor make passes of its own; those at the end of a wait, or of periods, are due without news too."""
-    executor.work = work
-    executor.beat = lambda now: work(now, True)
-    executor.round = lambda timeout: (
-        type(executor).round(executor, timeout) or work(executor.context.clock(), True)
-    )
 
 
 def spin_period(executor: "Any", period: float) -> None:
