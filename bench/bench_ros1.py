@@ -10,12 +10,17 @@ and the ratio muros : rosbags; below 1 muros is faster. Exit status 0 always: th
 from __future__ import annotations
 
 import argparse
+import sys
 from functools import partial
+from pathlib import Path
 
-from bench_cdr import race, samples
 from rosbags.typesys import Stores, get_typestore
 
 from muros.interfaces import converter, ros1_name
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from bench.bench_cdr import race, samples  # noqa: E402
 
 
 def main() -> int:
