@@ -328,3 +328,26 @@ def test_what_cannot_be_opened_is_said() -> None:
                 await scene.server.start()
 
     asyncio.run(scenario())
+
+
+def test_a_failure_of_ours_at_a_timer_ends_nothing() -> None:
+    async def scenario() -> None:
+        failures: list[Any] = []
+        asyncio.get_running_loop().set_exception_handler(lambda loop, context: failures.append(context))
+        async with rig(ask=20) as scene:
+            link: Any = scene.server.add_tcp(0, "127.0.0.1")
+            tick = scene.server.core.tick
+
+            def fail(now: int) -> int | None:
+                if len(failures) < 2:
+                    raise RuntimeError("a mistake")
+                return tick(now)
+
+            scene.server.core.tick = fail  # type: ignore[method-assign]
+            await scene.server.start()
+            board = scene.board(Tcp("127.0.0.1", link.port))
+            board.advertise("chatter", String)
+            await scene.until(lambda: scene.said(BoardReady))
+            assert [str(each["exception"]) for each in failures] == ["a mistake"] * 2
+
+    asyncio.run(scenario())

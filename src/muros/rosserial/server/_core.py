@@ -129,11 +129,11 @@ class ServerCore:
         for board in list(self.boards):
             if board.due is not None and board.due <= now:
                 board.tick(now)
+        if self._diagnosed_at is not None and self._diagnosed_at <= now:
+            self._diagnosed_at = now + self.limits.diagnostics
+            self._diagnose(now)
         waits = [board.due for board in self.boards if board.due is not None]
         if self._diagnosed_at is not None:
-            if self._diagnosed_at <= now:
-                self._diagnosed_at = now + self.limits.diagnostics
-                self._diagnose(now)
             waits.append(self._diagnosed_at)
         return min(waits) if waits else None
 

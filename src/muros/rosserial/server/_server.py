@@ -35,6 +35,8 @@ NODE_NAME = "/serial_node"
 """What boards are called when nothing else is said, as the node of the ROS 1 servers was."""
 
 _NS_PER_MS = 1_000_000
+_AFTER_FAILURE = 100
+"""When timers are looked at again after one has failed, in ms."""
 _GOODBYE_S = 0.05
 """How long lines are kept open for the last frames to leave."""
 
@@ -270,9 +272,13 @@ class Server:
     def _tick(self) -> None:
         self._timer = None
         self._ticking = True  # what wants to be called is asked for at the end
+        now = _now()
         try:
-            now = _now()
             due = self.core.tick(now)
+        except Exception as error:  # said loudly, yet the server goes on, and with it everybody else's boards
+            due = now + _AFTER_FAILURE
+            context = {"message": "the rosserial server has failed at a timer", "exception": error}
+            asyncio.get_running_loop().call_exception_handler(context)
         finally:
             self._ticking = False
         waits = [] if due is None else [due]
