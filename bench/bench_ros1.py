@@ -20,7 +20,7 @@ from muros.interfaces import converter, ros1_name
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from bench.bench_cdr import race, samples  # noqa: E402
+from bench.bench_cdr import race, samples
 
 
 def main() -> int:

@@ -174,9 +174,12 @@ def test_parameters_are_followed(master: Master, ros: Peer) -> None:
     async def main() -> None:
         async with station(master) as node:
             await ros.ask("set_param", name="/robot", value={"gain": 1.5, "names": ["a", "b"]})
+            await ros.ask("set_param", name="/robot_description", value="<robot/>" * 100_000)
             tree = ParameterTree()
             tree.update("/", await node.watch_parameters(tree.update))
             assert tree.get("/robot/gain") == 1.5
+            assert tree.get("/robot_description") == "<robot/>" * 100_000
+            await ros.ask("delete_param", name="/robot_description")
             await ros.ask("set_param", name="/robot/gain", value=2)
             await until(lambda: tree.get("/robot/gain") == 2)
             await ros.ask("delete_param", name="/robot/gain")
