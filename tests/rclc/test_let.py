@@ -553,6 +553,14 @@ def test_spin_keeps_the_periods_and_stop_ends_behind_one(local: InSpace) -> None
     assert plan.heard.values() == [(10, "out_0", 0), (20, "out_0", 10), (30, "out_0", 20)]
 
 
+def test_spin_until_keeps_the_periods_too(local: InSpace) -> None:
+    plan = Plan(local, 1)
+    assert plan.executor.spin_until(lambda: len(plan.calls) == 2, 1.0)
+    assert plan.heard.values() == [(10, "out_0", 0), (20, "out_0", 10)]
+    assert not plan.executor.spin_until(lambda: False, 0.015)
+    assert local.now - plan.heard.start == 40
+
+
 def test_what_another_thread_publishes_leaves_at_once(local: InSpace) -> None:
     heard = Heard(local, "out")
     node = local.context.node("node")

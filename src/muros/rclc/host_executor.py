@@ -208,7 +208,10 @@ class Executor(executor_.Executor):
         return self.spin_some(timeout / 1000)
 
     def spin_until(self, condition: Callable[[], object], timeout: float | None = None) -> bool:
-        """Runs until ``condition()`` is true, at most ``timeout`` seconds; whether it is."""
+        """Runs until ``condition()`` is true, at most ``timeout`` seconds; whether it is.
+
+        With LET and a period it runs whole periods, as ``spin`` does.
+        """
         return self._drive(self._until(condition, timeout))
 
     def spin_one_period(self, period: float | None = None) -> None:
@@ -337,11 +340,15 @@ class Executor(executor_.Executor):
 
     def _until(self, condition: Callable[[], object], timeout: float | None) -> Steps[bool]:
         end = self.context.clock() + _patience(timeout)
+        self.due = None
         while not condition():
             left = end - self.context.clock()
             if left <= 0 or not self._going():
                 return False
-            yield from self._round(min(left, self.timeout))
+            if self.let is not None and self.period:
+                yield from self._one_period(self.period)
+            else:
+                yield from self._round(min(left, self.timeout))
             yield 0.0
         return True
 
