@@ -10,10 +10,12 @@ import asyncio
 import json
 import os
 import resource
+import socket
 import sys
 import threading
 import time
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from typing import Any, Protocol
 
 TYPE = "std_msgs::msg::dds_::String_"
@@ -122,6 +124,44 @@ class Rtps:
         self._network.open(self._loop)
         self._loop.run_until_complete(work())
         self._network.close()
+
+
+class Bare:
+    """Datagrams under asyncio and nothing else: for round trips, the floor of whatever is written in Python."""
+
+    def __init__(self, domain: int, size: int) -> None:
+        self._loop = asyncio.new_event_loop()
+        self._body = cdr_string(size)
+        self._port = 7400 + 250 * domain + 200  # those of a participant that nobody has
+
+    def writer(self, topic: str) -> Callable[[], bool]:
+        sock, body, to = self._socket(), self._body, self._at(topic)
+        return lambda: sock.sendto(body, to) > 0
+
+    def reader(self, topic: str, on_sample: Callable[[], object]) -> None:
+        sock = self._socket()
+        sock.bind(self._at(topic))
+
+        def take() -> None:
+            with suppress(BlockingIOError):
+                while sock.recv(65536):
+                    on_sample()
+
+        self._loop.add_reader(sock, take)
+
+    def matched(self) -> int:
+        return 2
+
+    def run(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        self._loop.run_until_complete(work())
+
+    def _socket(self) -> socket.socket:
+        sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        sock.setblocking(False)
+        return sock
+
+    def _at(self, topic: str) -> tuple[str, int]:
+        return "127.0.0.1", self._port + (topic == "rt/back")
 
 
 class Cyclone:
@@ -434,6 +474,7 @@ def resident() -> int:
 IMPLEMENTATIONS: dict[str, Callable[[int, int], Implementation]] = {
     "muros": Muros,
     "rtps": Rtps,
+    "bare": Bare,
     "cyclone": Cyclone,
     "rclpy": Rclpy,
 }

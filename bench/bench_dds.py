@@ -3,7 +3,8 @@
 Run from a checkout: python bench/bench_dds.py [--seconds 2] [--only trips] [--with muros,rclpy] [--json FILE]
 
 Every measure has two processes that talk through DDS, both of one implementation: `muros` is the space engine `dds`,
-`rtps` the RTPS core with its sockets and no space; rclpy is ROS 2 Jazzy's, cyclone is cyclonedds-python under asyncio.
+`rtps` the RTPS core with its sockets and no space, `bare` datagrams under asyncio without any protocol (round trips
+only: the floor of whatever is written in Python); rclpy is ROS 2 Jazzy's, cyclone is cyclonedds-python under asyncio.
 The peers are those of the tests (tools/setup.sh fetches them); what is not installed is left out. Samples are
 std_msgs/String, reliable, keep all, so that every one that is written also arrives. The last column compares
 muros with the others; times are of the wall clock, CPU is of the process named.
@@ -29,7 +30,8 @@ WORKER = Path(__file__).with_name("_dds_worker.py")
 LIMIT = 40.0
 """Seconds that a step may take."""
 
-PEERS = {"muros": "cyclone", "rtps": "cyclone", "cyclone": "cyclone", "rclpy": "jazzy"}
+OURS = ("muros", "rtps", "bare")
+PEERS = {"muros": "cyclone", "rtps": "cyclone", "bare": "cyclone", "cyclone": "cyclone", "rclpy": "jazzy"}
 """Whose environment each implementation runs in."""
 
 
@@ -202,15 +204,16 @@ def main() -> None:
     print(f"{'':38}" + "".join(f"{name:>12}" for name in those) + "   muros is better by")
     for section in options.only or SECTIONS:
         measure, sizes, figures = SECTIONS[section]
+        measured = [name for name in those if name != "bare" or section == "trips"]
         for size in sizes:
             runs = [
-                {name: measure(name, size, options.seconds) for name in those} for _ in range(options.runs)
+                {name: measure(name, size, options.seconds) for name in measured} for _ in range(options.runs)
             ]
-            got = {name: _best([run[name] for run in runs], figures) for name in those}
+            got = {name: _best([run[name] for run in runs], figures) for name in measured}
             rows += [{"section": section, "size": size, "implementation": n, **got[n]} for n in got]
             for key, (label, form, more) in figures.items():
-                values = {name: got[name][key] for name in those}
-                line = "".join(f"{form.format(value):>12}" for value in values.values())
+                values = {name: got[name][key] for name in measured}
+                line = "".join(f"{form.format(values[n]) if n in values else '':>12}" for n in those)
                 print(f"{label + f', {size} B':38}{line}   {_compared(values, more)}", flush=True)
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1))
@@ -228,7 +231,7 @@ def _compared(values: dict[str, float], more: bool) -> str:
     own = values.get("muros")
     ratios = []
     for name, value in values.items():
-        if name in ("muros", "rtps") or not own or not value:
+        if name in OURS or not own or not value:
             continue
         ratio = own / value if more else value / own
         ratios.append(f"{ratio:.2f} x {name}")
@@ -236,7 +239,7 @@ def _compared(values: dict[str, float], more: bool) -> str:
 
 
 def _installed(name: str) -> bool:
-    if name in ("muros", "rtps"):
+    if name in OURS:
         return True
     lacking = peers._lacking(PEERS[name])
     if lacking:
