@@ -18,6 +18,7 @@ What a request names again stays as it is: nobody in the graph sees a board's re
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
@@ -210,7 +211,8 @@ class Board:
     def set_baud(self, baud: int) -> None:
         """The rate of the line in bits per second; 0 if it is no matter."""
         self.baud = baud
-        self.output.byte_us = self.decoder.byte_us = _BITS * 1_000_000 // baud if baud else 0
+        self.output.byte_us = _BITS * 1e6 / baud if baud else 0.0
+        self.decoder.byte_us = math.ceil(self.output.byte_us)
 
     def line_down(self, reason: str, now: int) -> None:
         """The line is gone; what the board has stays for a while."""
@@ -482,7 +484,7 @@ class Board:
 
     def _time(self, now: int) -> None:
         """Answers with the time at which the request left the board, as the board adds the whole round trip to it."""
-        stamp = self.core.world.time() - _TIME_BYTES * self.output.byte_us * 1000
+        stamp = self.core.world.time() - round(_TIME_BYTES * self.output.byte_us * 1000)
         body = bytearray(8)
         write_time(body, 0, stamp // 1_000_000_000 & 0xFFFFFFFF, stamp % 1_000_000_000)
         self.output.post(frame(ID_TIME, body, self.version))

@@ -207,7 +207,7 @@ class ServiceServer(Endpoint):
             ):
                 self._request = request
                 self._late = False
-                line = (len(body) + info.buffer_size) * board.output.byte_us // 1000
+                line = int((len(body) + info.buffer_size) * board.output.byte_us) // 1000
                 self.until = now + board.core.limits.answer + line
                 board.wake(self.until)
                 return

@@ -13,6 +13,8 @@ __all__ = ["Link", "Output", "Source"]
 
 _POLL = 20
 """When to look again at a line that takes nothing now, in ms; the link says it earlier if it can."""
+_SLACK = 1.005
+"""How much slower than its rate a line is written, as clocks of lines differ: what is too fast would pile up."""
 _BATCH = 2048
 """Bytes that are handed over at once, so that many small frames cost one call of the system."""
 
@@ -44,7 +46,7 @@ class Output:
     Counters: ``frames`` and ``bytes`` sent, ``dropped`` frames that found no room.
     """
 
-    def __init__(self, link: Link, address: Hashable, byte_us: int, lead: int, room: int) -> None:
+    def __init__(self, link: Link, address: Hashable, byte_us: float, lead: int, room: int) -> None:
         self.link = link
         self.address = address
         self.byte_us = byte_us
@@ -57,7 +59,7 @@ class Output:
         self._room = room
         self._urgent: deque[bytes] = deque()
         self._ready: deque[Source] = deque()
-        self._free_us = 0
+        self._free_us = 0.0
 
     def post(self, frame: bytes) -> bool:
         """Has a frame sent before all topics; False if too many wait."""
@@ -79,7 +81,7 @@ class Output:
     def clear(self) -> None:
         """Forgets what is urgent: the line is gone."""
         self._urgent.clear()
-        self._free_us = 0
+        self._free_us = 0.0
 
     def pump(self, now: int) -> int | None:
         """Sends what can be sent at ``now``; returns when to call again if something is left."""
@@ -87,13 +89,13 @@ class Output:
         now_us = 1000 * now
         while urgent or (ready and not self.holds):
             if self._free_us > now_us + self._lead_us:
-                return now + max(1, (self._free_us - now_us - self._lead_us) // 1000)
+                return now + max(1, int(self._free_us - now_us - self._lead_us) // 1000)
             if self.link.backlog(self.address):
                 return now + _POLL
             batch, n = self._batch(now, now_us)
             if not batch:
                 return None
-            self._free_us = max(self._free_us, now_us) + n * self.byte_us
+            self._free_us = max(self._free_us, now_us) + n * self.byte_us * _SLACK
             if self.link.send(batch[0] if len(batch) == 1 else b"".join(batch), self.address):
                 self.frames += len(batch)
                 self.bytes += n
