@@ -290,6 +290,16 @@ def test_users_own_types(tmp_path: Path) -> None:
     assert convert.to_cdr(convert.to_ros1(cdr, 9)) == cdr
 
 
+def test_a_folder_that_is_added_later_counts(tmp_path: Path) -> None:
+    for version, text in enumerate(("int32 x\n", "int32 x\nint32 y\n")):
+        folder = tmp_path / str(version)
+        (folder / "late_msgs/msg").mkdir(parents=True)
+        (folder / "late_msgs/msg/Late.msg").write_text(text)
+        interfaces.add_path(folder)
+        assert converter("late_msgs/Late").ros1_size == 4 * (version + 1)
+        assert converter("late_msgs/Late") is converter("late_msgs/Late")
+
+
 @pytest.mark.parametrize(
     ("name", "error"),
     [

@@ -70,7 +70,7 @@ class ServiceConverter:
 
 
 _lock = RLock()
-_made: dict[tuple[Registry, str, str | None], Converter] = {}
+_made: dict[tuple[Registry, int, str, str | None], Converter] = {}
 
 
 def converter(ros1_type: str, md5: str | None = None, distro: str | None = None) -> Converter:
@@ -82,10 +82,11 @@ def converter(ros1_type: str, md5: str | None = None, distro: str | None = None)
     home = _api.registry(distro)
     if md5 == "*":
         md5 = None
+    key = (home, hash(frozenset(home.user_files().items())), ros1_type, md5)  # the user's folders may change
     with _lock:
-        if (home, ros1_type, md5) not in _made:
-            _made[home, ros1_type, md5] = _convert(home, ros1_type, md5)
-        return _made[home, ros1_type, md5]
+        if key not in _made:
+            _made[key] = _convert(home, ros1_type, md5)
+        return _made[key]
 
 
 def service_converter(

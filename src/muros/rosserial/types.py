@@ -18,6 +18,7 @@ from muros.interfaces import (
     InterfaceError,
     Kind,
     known,
+    registry,
     ros1_definition,
     ros1_name,
     ros2_message,
@@ -32,7 +33,7 @@ BOARD_PACKAGE = "ros1"
 """The package that :func:`write` makes: programs say ``from ros1.std_msgs import String``."""
 
 _lock = RLock()
-_made: dict[str, type[Any]] = {}
+_made: dict[tuple[int, str], type[Any]] = {}
 
 
 class Service:
@@ -48,8 +49,9 @@ def message(ros1_type: str) -> type[Any]:
 
     Raises :class:`muros.interfaces.InterfaceError` if there is no such type.
     """
+    key = _key(ros1_type)
     with _lock:
-        if ros1_type not in _made:
+        if key not in _made:
             source = _source(ros1_type)
             space: dict[str, Any] = {"__name__": f"{BOARD_PACKAGE}.{ros1_type.partition('/')[0]}"}
             for nested in source.nested:
@@ -58,14 +60,14 @@ def message(ros1_type: str) -> type[Any]:
             filename = f"<muros ROS 1 {ros1_type}>"
             linecache.cache[filename] = (len(text), None, text.splitlines(keepends=True), filename)
             exec(compile(text, filename, "exec", dont_inherit=True), space)
-            _made[ros1_type] = space[_short(ros1_type)]
-        return _made[ros1_type]
+            _made[key] = space[_short(ros1_type)]
+        return _made[key]
 
 
 def service(ros1_type: str) -> type[Service]:
     """The class of a service, ``std_srvs/SetBool``, with ``.Request`` and ``.Response``; always the same one."""
+    key = _key(f"{ros1_type} service")
     with _lock:
-        key = f"{ros1_type} service"
         if key not in _made:
             halves = {half: message(f"{ros1_type}_{half}") for half in _HALVES}
             _made[key] = type(ros1_type.rpartition("/")[2], (Service,), {"TYPE": ros1_type, **halves})
@@ -89,6 +91,11 @@ def write(ros1_types: Iterable[str], folder: str | os.PathLike[str]) -> list[Pat
         path.write_text(module.text(package), encoding="utf-8")
         written.append(path)
     return sorted(written)
+
+
+def _key(name: str) -> tuple[int, str]:
+    """What is made once is made anew when the user's folders change."""
+    return hash(frozenset(registry().user_files().items())), name
 
 
 # ---- one class ----
