@@ -379,6 +379,26 @@ def test_what_a_callback_of_states_raises_ends_all_threads(alone: Crew) -> None:
         threads.run(LONG)
 
 
+def test_a_group_takes_what_was_made_on_a_node(alone: Crew) -> None:
+    """Each handle is in one group: services of parameters and an action too, but not what another group has."""
+    node, other = alone.node(), alone.node("other")
+    first, second = CallbackGroup("first"), CallbackGroup("second")
+    timer = first.add(node.timer(LONG, lambda: None))
+    with pytest.raises(RclError, match=r"the timer of 60000 ms, is in group 'first' already"):
+        second.add(timer)
+    other.timer(LONG, lambda: None)
+    server = node.action_server(Fibonacci, "count", lambda goal: None)
+    parameters = node.parameters()
+    sink = node.subscription(Int32, "number", lambda msg: None)
+    second.add_node(node)
+    assert second.handles == [server, *parameters.handles, sink]
+    threads = alone.threads(node.context)
+    threads.executor("first", None, first)
+    threads.executor("second", None, second)
+    with threads:
+        assert threads.threads[1].executor.handles == second.handles
+
+
 def test_a_thread_may_have_all_end(alone: Crew) -> None:
     node = alone.node()
     threads = alone.threads(node.context)

@@ -29,12 +29,12 @@ from muros.rclc.context import Context as AnyContext
 from muros.rclc.errors import RclError
 from muros.rclc.host_checks import WrongTypeError
 from muros.rclc.host_executor import Executor
-from muros.rclc.host_handles import tell_problem
+from muros.rclc.host_handles import describe, tell_problem
 from muros.rclc.scheduling import Policy
 from muros.rclc.sharing import Ended, Seat, share
 
 if TYPE_CHECKING:
-    from muros.rclc.hosts import Context
+    from muros.rclc.hosts import Context, Node
 
 __all__ = [
     "BEST_EFFORT",
@@ -107,11 +107,26 @@ class CallbackGroup:
         return [handle for handle, _, _ in self._members]
 
     def add(self, handle: Any, *arguments: Any, **options: Any) -> Any:
-        """Puts a handle into the group and returns it; further arguments are those of ``Executor.add``."""
+        """Puts a handle into the group and returns it; further arguments are those of ``Executor.add``.
+
+        Raises RclError for a handle that is in a group already.
+        """
+        other = vars(handle).get("callback_group") if hasattr(handle, "__dict__") else None
+        if other is not None:
+            raise RclError(
+                f"{describe(handle)}, is in group {other.name!r} already: a handle is in one group"
+            )
         if self.thread is not None:
             self.thread.add(handle, *arguments, **options)
+        handle.callback_group = self
         self._members.append((handle, arguments, options))
         return handle
+
+    def add_node(self, node: Node) -> None:
+        """Puts everything into the group that was made on a node and is in no group, in the order of making."""
+        for handle in list(node.context.handles):
+            if handle in node.entities and vars(handle).get("callback_group") is None:
+                self.add(handle)
 
     def __repr__(self) -> str:
         return f"CallbackGroup({self.name!r}, {self.real_time_class.value}, {len(self._members)} handles)"
@@ -324,6 +339,7 @@ class Threads:
         settled = threading.Event()
 
         def prepare() -> None:
+            scheduling.name_thread("carrier")
             said.append(scheduling.apply(_above(urgent)))
             settled.set()
 

@@ -312,6 +312,7 @@ class SensePlanAct:
 
     def _serve(self, component: Component, bell: Bell) -> None:
         """The thread of a component."""
+        scheduling.name_thread(component.name)
         problem = scheduling.apply(component.policy, component.cpus)
         if problem:
             self._tell(f"component {component.name!r}: {problem} It goes on with what it has.", NOT_SCHEDULED)
