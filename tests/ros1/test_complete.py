@@ -22,6 +22,8 @@ import pytest
 from muros.rosserial import types
 from muros.rosserial.node_handle import NodeHandle
 from muros.rosserial.tcp import Tcp
+from tests.cli.shell import Shell
+from tests.dds.domains import free_domain
 from tests.dds.peers import ROOT, Peer
 from tests.ros1.peers import Master, require_tools
 
@@ -51,7 +53,7 @@ def serving(master: Master, *words: str, port: int = 0) -> Iterator[tuple[subpro
     """`muros rosserial --ros1` and the port where boards dial in."""
     process = subprocess.Popen(
         [sys.executable, "-m", "muros", "rosserial", "--ros1", *ADDRESS, str(port), *words],
-        env=master.environment,
+        env=master.environment | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -236,14 +238,27 @@ def test_ports_and_rates_come_from_the_parameters_of_the_node(
 
 
 def test_both_graphs_at_once(master: Master, ros: Peer) -> None:
-    with serving(master, "--space", "local:") as (_, port), Board(port) as board:
+    with (
+        free_domain() as domain,
+        serving(master, "--space", f"dds:{int(domain)}") as (_, port),
+        Board(port) as board,
+    ):
+        ros2 = Shell(domain)
         heard = ros.do("subscriber", topic="/b/str", type="std_msgs/String")
         says = ros.do("publisher", topic="/h/str", type="std_msgs/String")
         meet(ros, heard, says)
         board.heard.clear()
-        ros.do("publish", publisher=says, message={"data": "x"})
-        assert ros.do("take", subscriber=heard) == [{"data": "echo x"}]
-        assert board.heard == ["x"]
+        assert ros2.run("topic pub -1 /h/str std_msgs/msg/String '{data: from ROS 2}'").returncode == 0
+        assert ros.do("take", subscriber=heard) == [{"data": "echo from ROS 2"}]
+        assert board.heard == ["from ROS 2"]
+        with ros2.running("topic echo /b/str") as echo:
+            ros.do("begin_publishing", publisher=says, message={"data": "from ROS 1"})
+            assert "echo from ROS 1" in echo.line("data")
+            ros.do("end_publishing")
+        called = ros2.run("service call /b/set_bool std_srvs/srv/SetBool '{data: true}'")
+        assert "board got 1" in called.stdout
+        answer = ros.do("call", service="/b/set_bool", type="std_srvs/SetBool", request={"data": False})
+        assert answer == {"success": True, "message": "board got 0"}
         ros.do("destroy", thing=heard)
         ros.do("destroy", thing=says)
 

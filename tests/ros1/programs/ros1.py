@@ -54,6 +54,23 @@ class Ros1:
         for _ in range(times):
             thing.publish(made)
 
+    def begin_publishing(self, publisher: int, message: dict[str, Any], period: float = 0.1) -> None:
+        """Publish a message again and again, until `end_publishing`."""
+        thing = self.things[publisher]
+        made = fill(thing.data_class(), message)
+        self.over = threading.Event()
+
+        def publish() -> None:
+            while not self.over.wait(period):
+                thing.publish(made)
+
+        self.thread = threading.Thread(target=publish)
+        self.thread.start()
+
+    def end_publishing(self) -> None:
+        self.over.set()
+        self.thread.join(10)
+
     def subscriber(self, topic: str, type: str) -> int:
         got: list[Any] = []
         thing = rospy.Subscriber(
