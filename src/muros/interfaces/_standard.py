@@ -32,10 +32,10 @@ SHARE = Path(__file__).parent / "share"
 PACKAGES = frozenset(
     """
     action_msgs actionlib_msgs builtin_interfaces composition_interfaces diagnostic_msgs example_interfaces
-    geometry_msgs libstatistics_collector lifecycle_msgs micro_ros_diagnostic_msgs micro_ros_msgs nav_msgs rcl_interfaces rmw_dds_common
-    rosbag2_interfaces rosgraph_msgs rosserial_arduino rosserial_msgs sensor_msgs service_msgs shape_msgs
-    statistics_msgs std_msgs std_srvs stereo_msgs tf2_msgs trajectory_msgs type_description_interfaces
-    unique_identifier_msgs visualization_msgs
+    geometry_msgs libstatistics_collector lifecycle_msgs micro_ros_diagnostic_msgs micro_ros_msgs nav_msgs
+    rcl_interfaces rmw_dds_common rosbag2_interfaces rosgraph_msgs rosserial_arduino rosserial_msgs sensor_msgs
+    service_msgs shape_msgs statistics_msgs std_msgs std_srvs stereo_msgs tf2_msgs trajectory_msgs
+    type_description_interfaces unique_identifier_msgs visualization_msgs
     """.split()
 )
 """Packages that have standard definitions in some distribution (kept here to answer without an import)."""
