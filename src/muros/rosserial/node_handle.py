@@ -15,7 +15,7 @@ Types are classes with ``TYPE``, ``MD5``, ``size()``, ``write(buf, off)`` and ``
 boards.
 """
 
-from muros.compat import const, ticks_add, ticks_diff, ticks_ms
+from muros.compat import const, sleep_ms, ticks_add, ticks_diff, ticks_ms
 from muros.rosserial.device import Device
 from muros.rosserial.messages import MessageError
 
@@ -170,7 +170,7 @@ class NodeHandle:
 
     def _spin(self, timeout: int) -> None:
         if not self._open and not self._opened():
-            self._port.wait(min(timeout, _STEP))
+            sleep_ms(min(timeout, _STEP))
             return
         due = self.device.tick(ticks_ms())
         if timeout:
