@@ -856,3 +856,18 @@ def test_a_board_that_restarts_and_logs_all_the_time_is_asked_again_too() -> Non
         scene.step(50)
         assert scene.now - start <= 1_300
     assert len(scene.said(BoardReset)) == 1
+
+
+def test_who_never_spoke_leaves_nothing_behind() -> None:
+    scene = Scene(max_boards=5)
+    for i in range(20):
+        scene.port.up(i, scene.now)
+        scene.port.receive(b"GET / HTTP/1.1\r\n", i, scene.now)
+        scene.step(10)
+        scene.port.down(i, "connection closed by the far end", scene.now)
+    assert scene.core.boards == []
+    assert "too-many-boards" not in scene.codes()
+    board, led, _ = led_board(scene)
+    scene.writer("/led_out", BYTE)(data=1)
+    scene.step(2)
+    assert board.taken(led) == [b"\x01"]

@@ -222,6 +222,9 @@ class Board:
         self._step(LINE_DOWN)
         self.output.clear()
         self.roster.restart()
+        if self.node is None:  # it never was a board, as far as one could hear
+            self.core.remove(self, reason)
+            return
         self._lose(reason, now)
         self._plan(now)
 
