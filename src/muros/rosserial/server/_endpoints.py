@@ -118,6 +118,7 @@ class Subscription(Endpoint):
         super().__init__(board, infos, NO_SHAPE)
         self.subscriber: Subscriber | None = None
         self._queued = False
+        self._waiting: deque[bytes] = deque()
 
     def begin(self, subscriber: Subscriber) -> None:
         """Its counterpart is there."""
@@ -131,20 +132,48 @@ class Subscription(Endpoint):
             self.board.pump(self.board.core.clock())
 
     def next(self, now: int) -> bytes | None:
-        """The next frame for the board."""
-        assert self.subscriber is not None
+        """The next frame for the board: the oldest message, or on a slow line the oldest of the newest few."""
         info = self.infos[0]
+        if self.board.output.byte_us:
+            self._hurry()
         while True:
-            try:
-                body = self.subscriber.take()
-            except BodyError as error:
-                self.malformed(error, "to")
-                continue
+            body = self._waiting.popleft() if self._waiting else self._take()
             if body is None:
                 self._queued = False
                 return None
             if self.fits(len(body), info.buffer_size):
                 return frame(info.topic_id, body, self.board.version)
+
+    def restart(self) -> None:
+        """What waited is for whom the board was."""
+        self._waiting.clear()
+
+    def _take(self) -> bytes | None:
+        assert self.subscriber is not None
+        while True:
+            try:
+                return self.subscriber.take()
+            except BodyError as error:
+                self.malformed(error, "to")
+
+    def _hurry(self) -> None:
+        """Lets what is old go, where the line is slower than what is published."""
+        waiting = self._waiting
+        dropped = 0
+        while (body := self._take()) is not None:
+            waiting.append(body)
+            if len(waiting) > self.board.core.limits.backlog:
+                waiting.popleft()
+                dropped += 1
+        if dropped:
+            self.board.report(
+                "line-too-slow",
+                subject=self.name,
+                what=f"{{n}} message{{s}} on {self.name} not sent to {self.board.who}",
+                why="newer ones came before the line had room for them",
+                remedy="Publish less often or shorter messages, or use a higher baud rate",
+                n=dropped,
+            )
 
     def close(self) -> None:
         """Takes it out of the world."""

@@ -10,6 +10,7 @@ _AT_LEAST_ONE = (
     "ask",
     "settle",
     "lead",
+    "backlog",
     "max_boards",
     "max_endpoints",
     "max_requests",
@@ -38,6 +39,8 @@ class Limits:
     """How long a board's service may take for an answer, besides the time on the line."""
     lead: int = 20
     """How far the server writes ahead of a line whose rate is known; what is urgent waits so long at most."""
+    backlog: int = 10
+    """Messages of one topic that wait for a line whose rate is known; older ones make room for newer ones."""
     slow_frame: int = SLOW_FRAME_MS
     """A frame that takes longer on the line is warned about: many boards drop it."""
     diagnostics: int = 1_000
