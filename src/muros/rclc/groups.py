@@ -135,8 +135,8 @@ class CallbackGroup:
 class ExecutorThread:
     """A thread that runs an executor; made by ``Threads.executor``.
 
-    ``executor`` is the ``Executor``. ``problem`` says why the system does not schedule the thread as ``policy`` and
-    ``cpus`` say, "" if it does; ``error`` is what has ended the thread, None if nothing has.
+    ``executor`` is the ``Executor``. ``unscheduled`` says why the system does not schedule the thread as ``policy``
+    says, ``unpinned`` why not on ``cpus``, "" if it does; ``error`` is what has ended the thread, None if nothing has.
     """
 
     def __init__(
@@ -152,7 +152,8 @@ class ExecutorThread:
         self.cpus = cpus
         self.executor = executor
         self.groups: list[CallbackGroup] = []
-        self.problem = ""
+        self.unpinned = ""
+        self.unscheduled = ""
         self.error: BaseException | None = None
         self.ended = True
         self._owner = owner
@@ -234,7 +235,8 @@ class ExecutorThread:
         sharing = self._owner.sharing
         try:
             scheduling.name_thread(self.name)
-            self.problem = scheduling.apply(self.policy, self.cpus)
+            self.unpinned = scheduling.pin(self.cpus)
+            self.unscheduled = scheduling.schedule(self.policy)
             sharing.sit(self._seat)
             self._settled.set()
             executor = self.executor
@@ -464,9 +466,14 @@ class Threads:
     def _tell_scheduling(self, carrier: str) -> None:
         """Tells of all threads together what the system has refused."""
         said: dict[str, list[str]] = {}
-        for thread in self.threads:
-            if thread.problem:
-                said.setdefault(thread.problem, []).append(repr(thread.name))
+        urgent = ""
+        for thread in sorted(self.threads, key=lambda each: -(each.policy.priority if each.policy else 0)):
+            problem = thread.unscheduled
+            if problem and thread.policy is not None and thread.policy.priority:
+                problem = urgent = urgent or problem  # what lets this one through lets those below through
+            for text in (problem, thread.unpinned):
+                if text:
+                    said.setdefault(text, []).append(repr(thread.name))
         if carrier and not said:
             said[carrier] = ["'carrier'"]
         if said:

@@ -33,7 +33,9 @@ __all__ = [
     "idle",
     "name_thread",
     "other",
+    "pin",
     "round_robin",
+    "schedule",
 ]
 
 LEAST_PRIORITY: Final = 1
@@ -129,13 +131,42 @@ def apply(policy: Policy | None, cpus: Collection[int] | None = None) -> str:
 
     "" if the system did it, else why not and what to do about it, in one sentence. What is possible of it is done.
     """
-    said = []
-    this = threading.get_native_id()
-    if cpus is not None:
-        said.append(_pin(this, cpus))
-    if policy is not None:
-        said.append(_schedule(this, policy))
-    return " ".join(text for text in said if text)
+    return " ".join(text for text in (pin(cpus), schedule(policy)) if text)
+
+
+def pin(cpus: Collection[int] | None) -> str:
+    """The half of ``apply`` that is about processors."""
+    if cpus is None:
+        return ""
+    if not hasattr(os, "sched_setaffinity"):
+        return "This system does not pin threads to processors."
+    try:
+        os.sched_setaffinity(threading.get_native_id(), cpus)
+    except (OSError, ValueError, OverflowError):
+        usable = _ranges(sorted(os.sched_getaffinity(0)))
+        return f"It is not pinned to processors {_ranges(sorted(cpus))}: this process may use {usable}."
+    return ""
+
+
+def schedule(policy: Policy | None) -> str:
+    """The half of ``apply`` that is about the policy."""
+    if policy is None:
+        return ""
+    thread = threading.get_native_id()
+    try:
+        if policy.name == "DEADLINE":
+            _set_deadline(policy)
+            return ""
+        number = getattr(os, f"SCHED_{policy.name}", None)
+        if number is None or not hasattr(os, "sched_setscheduler"):
+            return f"This system has no {policy}."
+        if os.sched_getscheduler(thread) != number or policy.real_time:
+            os.sched_setscheduler(thread, number, os.sched_param(policy.priority))
+        if policy.name == "OTHER" and os.getpriority(os.PRIO_PROCESS, thread) != policy.nice:
+            os.setpriority(os.PRIO_PROCESS, thread, policy.nice)
+    except OSError as error:
+        return _refusal(policy, error.errno or 0)
+    return ""
 
 
 def name_thread(name: str) -> None:
@@ -168,36 +199,6 @@ def _priority(priority: Any) -> int:
             f"priority is {priority!r}: real-time priorities are from {LEAST_PRIORITY} to {HIGHEST_PRIORITY}"
         )
     return priority
-
-
-def _pin(thread: int, cpus: Collection[int]) -> str:
-    """Has a thread run on some processors only."""
-    if not hasattr(os, "sched_setaffinity"):
-        return "This system does not pin threads to processors."
-    try:
-        os.sched_setaffinity(thread, cpus)
-    except (OSError, ValueError, OverflowError):
-        usable = _ranges(sorted(os.sched_getaffinity(0)))
-        return f"It is not pinned to processors {_ranges(sorted(cpus))}: this process may use {usable}."
-    return ""
-
-
-def _schedule(thread: int, policy: Policy) -> str:
-    """Gives a thread a policy."""
-    try:
-        if policy.name == "DEADLINE":
-            _set_deadline(policy)
-            return ""
-        number = getattr(os, f"SCHED_{policy.name}", None)
-        if number is None or not hasattr(os, "sched_setscheduler"):
-            return f"This system has no {policy}."
-        if os.sched_getscheduler(thread) != number or policy.real_time:
-            os.sched_setscheduler(thread, number, os.sched_param(policy.priority))
-        if policy.name == "OTHER" and os.getpriority(os.PRIO_PROCESS, thread) != policy.nice:
-            os.setpriority(os.PRIO_PROCESS, thread, policy.nice)
-    except OSError as error:
-        return _refusal(policy, error.errno or 0)
-    return ""
 
 
 def _set_deadline(policy: Policy) -> None:
