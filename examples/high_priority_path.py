@@ -25,11 +25,15 @@ from muros.rclc import ALWAYS, Executor, one
 
 from std_msgs.msg import Int32, String
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import Any
+
 context = open_context()
 robot = context.node("robot")
 scans = robot.publisher(Int32, "laser")
 ticks = 0
-state = {"distance": 0, "orders": "", "stopped": False}
+state: "dict[str, Any]" = {"distance": 0, "orders": "", "stopped": False}
 
 
 def measure() -> None:

@@ -25,7 +25,7 @@ sensors, fusion = context.node("sensors"), context.node("fusion")
 imu, laser = sensors.publisher(Int32, "imu"), sensors.publisher(Int32, "laser")
 sets = fusion.publisher(UInt8MultiArray, "imu_sets")
 ticks = 0
-samples = []
+samples: "list[int]" = []
 scan = 0
 
 

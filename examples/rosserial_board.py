@@ -15,6 +15,7 @@ the classes of messages are files, see docs/rosserial.md.
 
 import sys
 from contextlib import suppress
+from typing import Any
 
 from muros.rosserial.node_handle import NodeHandle
 from muros.rosserial.serial import Serial
@@ -30,12 +31,12 @@ line = Serial(host) if "/" in host else Tcp(host, int(port or 11411))
 node = NodeHandle(line)
 
 
-def switch(leds) -> None:
+def switch(leds: Any) -> None:
     """Each bit is a LED."""
     print(f"LEDs: {leds.data & 15:04b}")
 
 
-def buzz(request):
+def buzz(request: Any) -> Any:
     """The answer to a call."""
     print("buzz")
     return Trigger.Response(True, "loud and clear")
