@@ -213,6 +213,16 @@ def test_who_waits_is_woken_and_so_is_who_is_about_to_wait() -> None:
     assert sorted(passed) == [0, 1, 2]
 
 
+def test_a_thread_may_wake_itself_as_handlers_of_signals_do() -> None:
+    gate = Turnstile()
+    gate.look()
+    gate.wake()
+    gate.wait(None, LONG)
+    gate.look()
+    gate.wake(others=True)
+    gate.wait(None, 1)  # it knows: so it waits
+
+
 def test_the_leader_gets_up_for_what_is_due_sooner() -> None:
     gate = Turnstile()
 

@@ -195,7 +195,7 @@ class Session(board.Session):
     def _pass_on(self, taken: int) -> None:
         """Something was taken, or is due by now: wakes the threads whom that may concern."""
         if taken:
-            self._gate.wake()
+            self._gate.wake(others=True)
         elif self._gate.leading:
             self._gate.due(ticks_add(self.now, self.deadline(self.now)))
 

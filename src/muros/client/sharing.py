@@ -70,13 +70,16 @@ class Turnstile:
         """This thread waits in the place of one that has seen a generation."""
         self._seen.generation = generation
 
-    def wake(self) -> None:
-        """Ends every wait, and the next one of each thread that has not looked since; from any thread."""
+    def wake(self, others: bool = False) -> None:
+        """Ends every wait, and the next one of each thread that has not looked since; from any thread.
+
+        ``others``: but not the next one of this thread, which knows already.
+        """
         with self._changed:
             fresh = self._seen.generation == self._generation
             self._generation += 1
-            if fresh:
-                self._seen.generation = self._generation  # what we do ourselves we need not be told
+            if others and fresh:
+                self._seen.generation = self._generation
             self.several = True
             if self._followers:
                 self._changed.notify_all()
