@@ -217,7 +217,8 @@ def test_a_command_leaves_the_graph_when_it_is_told_to_end(shell: Shell) -> None
 
 
 def test_who_reads_our_output_may_leave(shell: Shell) -> None:
-    with shell.running(f"topic pub -r 50 -p 0 /count {STRING} 'data: x'"):
+    with shell.running(f"topic pub -r 50 -p 10 /count {STRING} 'data: x'") as pub:
+        pub.line("publishing #10: ")
         echo = subprocess.Popen(
             [sys.executable, "-m", "muros", "topic", "echo", "/count"],
             env=shell.environment,
@@ -230,7 +231,8 @@ def test_who_reads_our_output_may_leave(shell: Shell) -> None:
         assert echo.stdout.readline() == "data: x\n"
         echo.stdout.close()
         assert echo.wait(LIMIT) == 1
-        assert echo.stderr.read() == ""
+        # On a busy machine it may have waited for its topic.
+        assert [line for line in echo.stderr if "waiting: topic" not in line] == []
         echo.stderr.close()
 
 

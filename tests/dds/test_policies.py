@@ -38,6 +38,7 @@ def test_they_miss_what_we_do_not_write_in_time(name: str, peer: Fetch, rig: Rig
         other, "subscription", node=node, topic="/chatter", type=TYPE, qos={"depth": 10, "deadline": 0.3}
     )
     rig.matched(writer)
+    rig.ask(other, "matched", thing=theirs)
     writer.write(string("once"))
     assert rig.ask(other, "events", subscription=theirs, last="deadline")[-1] == "deadline"
     assert writer.deadline_missed >= 1

@@ -83,6 +83,7 @@ def test_what_a_sample_carries_besides_its_body(distro: str, peer: Fetch, rig: R
     reader = rig.space(domain).participant("listener").reader(Topic("rt/t", STRING), Qos(depth=5))
     publisher = rig.ask(ros, "publisher", node=node, topic="/t", type="std_msgs/msg/String")
     rig.matched(reader)
+    assert rig.ask(ros, "matched", thing=publisher) == 1
     info = rig.ask(ros, "endpoints", node=node, topic="/t", publishers=1, subscriptions=1)
     rig.ask(ros, "publish", publisher=publisher, message={"data": "x"}, count=2)
     rig.until(lambda: reader.pending == 2)
@@ -139,6 +140,7 @@ def test_five_percent_loss_is_repaired(distro: str, size: int, peer: Fetch, rig:
     publisher = rig.ask(ros, "publisher", node=node, topic="/in", type=kind, qos=latched)
     rig.matched(writer)
     rig.matched(reader)
+    assert rig.ask(ros, "matched", thing=publisher) == rig.ask(ros, "matched", thing=subscription) == 1
     for n in range(count):
         writer.write(array(pattern(size, n)))
     rig.ask(ros, "publish_bytes", publisher=publisher, size=size, count=count, period=0.001)
@@ -290,6 +292,7 @@ def test_keep_all_waits_for_a_ros_that_stands_still(peer: Fetch, rig: Rig, domai
         rig.space(domain).participant("ours").writer(Topic("rt/out", STRING), Qos(history=History.KEEP_ALL))
     )
     rig.matched(writer)
+    assert rig.ask(ros, "matched", thing=subscription) == 1
     sent = 0
     for _ in range(2000):
         rig.until(lambda: writer.write(string(f"n{sent}")), "room")  # noqa: B023

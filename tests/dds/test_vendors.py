@@ -37,6 +37,7 @@ def test_large_samples(name: str, loss: float, peer: Fetch, rig: Rig, domain: Do
     publisher = rig.ask(vendor, "publisher", topic="/in", **kind)
     rig.matched(writer)
     rig.matched(reader)
+    assert rig.ask(vendor, "matched", thing=publisher) == rig.ask(vendor, "matched", thing=subscription) == 1
     sizes = [200_000] * 5 + ([] if loss else [2_000_000] * 2)
     for n, size in enumerate(sizes):
         writer.write(array(pattern(size, n)))
