@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _FRAGMENT = const(13)
 _LAST = const(0x02)
 _SIZE = const(200000)
-_ROOM = const(16000)  # bytes of heap that streaming may take, on 64 bit, with the code that is borrowed for it
+_ROOM = const(16000)  # bytes of heap that streaming may take, borrowed code included, on 64 bit
 
 
 class Summing(Agent):
