@@ -249,5 +249,6 @@ def test_a_transport_of_ones_own_is_left_now_and_then() -> None:
     gate.look()
     gate.wait(own, LONG)
     gate.wake()
+    gate.look()
     gate.wait(own, LONG)
     assert waits == [LONG, 10]
