@@ -1,10 +1,12 @@
 """Logical execution time: inputs at the start of a period, outputs at its end, and what follows when one is late."""
 
+import gc
 import os
 import random
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -738,6 +740,21 @@ def test_low_priority_and_errors(local: InSpace, goes_on: bool) -> None:
             crew.period(0, 1)
     assert crew.plan.executor.errors == 1
     crew.let.close()
+
+
+def test_a_worker_ends_with_its_executor(local: InSpace) -> None:
+    def workers() -> int:
+        return sum(thread.name == "muros LET" for thread in threading.enumerate())
+
+    until(lambda: workers() == 0)
+    crew = Crew(local, None)
+    assert crew.period(0) == ["out_0"]
+    assert workers() == 1
+    for handle in crew.plan.executor.handles:
+        handle.destroy()
+    gone = weakref.ref(crew.let)
+    del crew, handle
+    until(lambda: gc.collect() >= 0 and gone() is None and workers() == 0)
 
 
 def test_low_priority_as_it_is_spun(local: InSpace) -> None:

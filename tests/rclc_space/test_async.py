@@ -1,6 +1,7 @@
 """Executors in asyncio programs: beside other tasks, over sessions and spaces, and in a space of the loop's own."""
 
 import asyncio
+import gc
 import threading
 from collections.abc import Callable, Coroutine
 from typing import Any
@@ -242,3 +243,22 @@ def test_a_space_that_the_program_serves(url: str) -> None:
 
     run(program())
     assert got == list(range(10))
+
+
+def test_the_thread_that_waits_ends_with_its_executor() -> None:
+    def waiting() -> int:
+        gc.collect()
+        return sum(thread.name == "muros asyncio" for thread in threading.enumerate())
+
+    async def program() -> None:
+        await until(lambda: waiting() == 0)
+        context = Context("local:")
+        executor = Executor(context)
+        executor.add(GuardCondition(context, print))
+        assert not await executor.spin_some_async(0.01)
+        assert waiting() == 1
+        del executor
+        context.close()
+        await until(lambda: waiting() == 0)
+
+    run(program())

@@ -23,6 +23,9 @@ if TYPE_CHECKING:  # asyncio is imported where it is used: programs that have no
 
     Came = asyncio.Future[bool]  # done when a wait is over; whether the thread that waited has said so
 
+_LONGEST = 1000.0
+"""Milliseconds of one wait: a thread that was woken just before it went to sleep is wanted again so soon."""
+
 _waiting: weakref.WeakKeyDictionary[Any, list[tuple[Executor, Came]]] = weakref.WeakKeyDictionary()
 """Who waits, by context."""
 
@@ -33,12 +36,21 @@ class Sleeper:
     def __init__(self, executor: Executor) -> None:
         self._orders: queue.SimpleQueue[tuple[asyncio.AbstractEventLoop, Any, float, Any, Came] | None]
         self._orders = queue.SimpleQueue()
+        self._came: Came | None = None
         threading.Thread(target=_sleep, args=(self._orders,), daemon=True, name="muros asyncio").start()
         weakref.finalize(executor, self._orders.put, None)
 
     def wait(self, loop: asyncio.AbstractEventLoop, middleware: Any, timeout: float, came: Came) -> None:
-        """Has `came` done when something may have come, after `timeout` ms at the latest."""
-        self._orders.put((loop, middleware, timeout, getattr(middleware, "seen", None), came))
+        """Has `came` done when something may have come, after `timeout` ms at the latest, or sooner."""
+        self._came = came
+        self._orders.put((loop, middleware, min(timeout, _LONGEST), getattr(middleware, "seen", None), came))
+
+    def rouse(self) -> None:
+        """Ends the wait that goes on; from any thread."""
+        came = self._came
+        if came is not None:
+            with suppress(RuntimeError):  # its loop is closed
+                came.get_loop().call_soon_threadsafe(_settle, came, False)
 
 
 async def pause(executor: Executor, timeout: float) -> None:
@@ -118,7 +130,8 @@ def _sleep(orders: queue.SimpleQueue[Any]) -> None:
         try:
             if seen is not None:
                 middleware.adopt(seen)
-            middleware.wait(timeout if seen is None else max(1, int(timeout)))
+            if not came.done():
+                middleware.wait(timeout if seen is None else max(1, int(timeout)))
         except BaseException as raised:
             error = raised
         with suppress(RuntimeError):  # the loop is closed

@@ -256,6 +256,8 @@ class Executor(executor_.Executor):
         """
         self.stopped = True
         self.wake()
+        if self.sleeper is not None:
+            self.sleeper.rouse()
 
     def wake(self) -> None:
         """Ends a wait, from any thread, as far as the middleware can be woken."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import queue
 import threading
+import weakref
 from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -164,7 +165,7 @@ class HostLet(Let):
             if self._worker is None:
                 self._worker = _Worker(self)
             for task in self._queue:
-                self._worker.tasks.put(task)
+                self._worker.orders.put((self, task))
             self._queue = []
 
     def _look(self) -> None:
@@ -204,11 +205,11 @@ class HostLet(Let):
         self._worker = None
         while True:
             try:
-                waiting = worker.tasks.get_nowait()
+                waiting = worker.orders.get_nowait()
             except queue.Empty:
                 break
             if waiting is not None:
-                self._queue.append(waiting)
+                self._queue.append(waiting[1])
         worker.end()
         if task.result == "OVERRUN":
             worker.lower()
@@ -216,18 +217,18 @@ class HostLet(Let):
 
 
 class _Worker:
-    """A thread that runs tasks one after the other."""
+    """A thread that runs tasks one after the other; while it has none it holds on to nobody."""
 
     def __init__(self, let: HostLet) -> None:
-        self.tasks: queue.SimpleQueue[HostTask | None] = queue.SimpleQueue()
+        self.orders: queue.SimpleQueue[tuple[HostLet, HostTask] | None] = queue.SimpleQueue()
         self.current: HostTask | None = None
-        self._let = let
         self._thread = threading.Thread(target=self._work, daemon=True, name="muros LET")
         self._thread.start()
+        weakref.finalize(let, self.orders.put, None)
 
     def end(self) -> None:
         """It ends behind what it has been given."""
-        self.tasks.put(None)
+        self.orders.put(None)
 
     def lower(self) -> None:
         """From now on it runs behind others, as far as the system knows priorities of threads.
@@ -242,19 +243,22 @@ class _Worker:
             os.setpriority(os.PRIO_PROCESS, number, _LOW)
 
     def _work(self) -> None:
-        let = self._let
-        while (task := self.tasks.get()) is not None:
-            self.current = task
-            outer = let.outputs.open(task)
-            begun = let.executor.context.clock()
-            try:
-                let.run(task)
-            except Exception as error:
-                task.error = error
-            finally:
-                let.outputs.close(outer)
-                task.input = None
-                task.finished = let.executor.context.clock()
-                task.took = task.finished - begun
-                self.current = None
-                task.done = True
+        while (order := self.orders.get()) is not None:
+            self._run(*order)
+            del order
+
+    def _run(self, let: HostLet, task: HostTask) -> None:
+        self.current = task
+        outer = let.outputs.open(task)
+        begun = let.executor.context.clock()
+        try:
+            let.run(task)
+        except Exception as error:
+            task.error = error
+        finally:
+            let.outputs.close(outer)
+            task.input = None
+            task.finished = let.executor.context.clock()
+            task.took = task.finished - begun
+            self.current = None
+            task.done = True
