@@ -350,6 +350,20 @@ def test_a_groovy_board_that_restarts_is_asked_again_when_it_is_silent() -> None
     assert scene.until(lambda: board.connected, within=10_000) <= 3_600
 
 
+def test_a_groovy_board_that_restarts_is_missed_sooner_where_it_has_talked_all_the_time() -> None:
+    scene = Scene()
+    board, _, chatter = led_board(scene, VERSION_GROOVY)
+    for i in range(100):
+        board.send(chatter, string(str(i)))
+        scene.step(50)
+    board.boot()
+    assert scene.until(lambda: board.connected, within=10_000) <= 1_100
+    scene.step(
+        20_000
+    )  # from then on it is quiet, and asked no more than once for each second that it is missed
+    assert scene.core.boards[0].asks <= 12
+
+
 def test_another_firmware_replaces_what_has_changed_and_keeps_the_rest() -> None:
     scene = Scene()
     board, led, _ = led_board(scene)

@@ -110,6 +110,10 @@ _OPEN = 3_000
 """How long a topic request may still be answered, in ms."""
 _BOOT = 2_000
 """Silence until other rates are tried: boards may start when their port is opened, in ms."""
+_PACE_OF = 8
+"""So many messages make the average, and so many are missed until it counts as silent."""
+_PAUSE = 1_000
+"""A shorter pause means nothing, in ms."""
 _CHECK_AFTER = 700
 """Silence before checks begin, in ms."""
 _TRIES = 3
@@ -174,6 +178,8 @@ class Board:
         self._told_ready = False
         self._told_lost = False
         self._checked_at = 0
+        self._pace = float(core.limits.silent)
+        """Time between its messages, on average, in ms."""
 
     @property
     def in_sync(self) -> bool:
@@ -310,7 +316,7 @@ class Board:
             if self._settle_at is not None:
                 self.wake(self._settle_at)
             if self.last_time is not None:
-                self.wake(self.connected_at + limits.silent)
+                self.wake(self.connected_at + self._patience())
                 if limits.check and self.version == VERSION_HYDRO:
                     self.wake(max(self.connected_at + _CHECK_AFTER, self._checked_at + limits.check))
         if self.lost_at is not None:
@@ -323,7 +329,8 @@ class Board:
         if self.last_time is None:
             return  # it never asks for the time: its silence means nothing
         silence = now - self.connected_at
-        if silence >= limits.silent:
+        if silence >= self._patience():
+            self._pace = float(limits.silent)  # it may have become quiet
             self._step(SILENCE)
             self._ask(now)
         elif (
@@ -334,6 +341,13 @@ class Board:
         ):
             self._checked_at = now
             self.output.post(CHECK)
+
+    def _patience(self) -> int:
+        """How long it may show no sign. Boards of Groovy cannot be checked, so their own pace is what one can go by."""
+        silent = self.core.limits.silent
+        if self.version != VERSION_GROOVY:
+            return silent
+        return min(silent, max(_PAUSE, int(_PACE_OF * self._pace)))
 
     def _step(self, what: str) -> None:
         self.state = TRANSITIONS.get((self.state, what), self.state)
@@ -440,6 +454,7 @@ class Board:
         self.heard_at = now
         receive = self._incoming.get(topic_id)
         if receive is not None:
+            self._pace += (now - self.connected_at - self._pace) / _PACE_OF
             self.connected_at = now
             if self.state == SILENT:
                 self._heard_again(now)
