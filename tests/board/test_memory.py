@@ -3,9 +3,10 @@
 from muros.client import Session
 from muros.compat import MPY, const
 from muros.rclc import Arena, CapacityError, Context, Executor, Rules, Text
-from muros.rclc.memory import REFUSED
+from muros.rclc.memory import REFUSED, check
+from muros.rclc.memory_plan import make
 from tests.board.agent import Agent
-from tests.board.harness import raises
+from tests.board.harness import allocates, raises
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -175,3 +176,16 @@ def test_a_flood_is_told_now_and_then() -> None:
         rig.hear(data)
     assert rig.subscription.refused == 40
     assert len(rig.problems) == 6  # 1, 2, 4, 8, 16, 32
+
+
+def test_looking_takes_no_heap() -> None:
+    plan = make(Rules({"names": 2, "names.data": 4}, strings=3), Names)
+    stack = [0, 0]
+    good = body("abc", ["abcd", "x"], 6)
+    bad = body("abc", ["abcd", "xxxxx"], 6)
+
+    def look() -> None:
+        assert check(plan, stack, good, 0, len(good)) == -1
+        assert check(plan, stack, bad, 0, len(bad)) > 0
+
+    assert allocates(look) == 0

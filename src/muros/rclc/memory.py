@@ -122,7 +122,8 @@ def check(plan: "list[int]", stack: "list[int]", buf: "Buffer", off: int, n: int
 
     ``stack`` is room for what is still to be repeated.
     """
-    del stack[:]
+    while stack:
+        stack.pop()
     end = off + n
     p = off
     i = 0
@@ -139,7 +140,8 @@ def check(plan: "list[int]", stack: "list[int]", buf: "Buffer", off: int, n: int
             if stack[-1]:
                 i = stack[-2]
             else:
-                del stack[-2:]
+                stack.pop()
+                stack.pop()
             continue
         elif step == _TIMES:
             stack.append(i)
