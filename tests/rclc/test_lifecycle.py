@@ -75,7 +75,7 @@ def test_the_table_is_that_of_ros() -> None:
     assert [name for name, _ in lifecycle_states.SERVICES] == names
 
 
-def test_create_and_destroy() -> None:  # L1
+def test_l1_create_and_destroy() -> None:
     managed = Managed()
     assert managed.lifecycle.state == TABLE["initial_state"] == "unconfigured"
     assert len(managed.lifecycle.services) == 5
@@ -84,7 +84,7 @@ def test_create_and_destroy() -> None:  # L1
     assert Managed(services=False).lifecycle.services == []
 
 
-def test_to_active_and_back() -> None:  # L2
+def test_l2_to_active_and_back() -> None:
     managed = Managed()
     states = []
     for transition in ("configure", "activate", "deactivate", "cleanup"):
@@ -93,7 +93,7 @@ def test_to_active_and_back() -> None:  # L2
     assert states == [INACTIVE, ACTIVE, INACTIVE, UNCONFIGURED]
 
 
-def test_callbacks_are_called_in_their_order() -> None:  # L3
+def test_l3_callbacks_are_called_in_their_order() -> None:
     managed = Managed()
     lifecycle = managed.lifecycle
     for n, step in enumerate(
@@ -103,7 +103,7 @@ def test_callbacks_are_called_in_their_order() -> None:  # L3
         assert managed.called == list(LABELS[:n])
 
 
-def test_services_are_handles_that_an_executor_counts() -> None:  # L4
+def test_l4_services_are_handles_that_an_executor_counts() -> None:
     managed = Managed()
     first, second, third, *_ = managed.lifecycle.services
     small = Executor(managed.board.context, handles=1)
