@@ -242,7 +242,7 @@ def test_r2_to_r5_entities_come_and_go(stage: Stage, case: str) -> None:
     assert node.context.handles == []
 
 
-def test_r2_several_on_one_topic_share_nothing(stage: Stage) -> None:
+def test_r2_r6_several_on_one_topic_share_nothing(stage: Stage) -> None:
     pair = Pair(stage)
     first, second = (pair.one.publisher(Int32, "value") for _ in range(2))
     pair.other.subscription(Int32, "value", lambda message: pair.got.append(message.data))
