@@ -33,7 +33,7 @@ from muros.rclc import (
     Threads,
     scheduling,
 )
-from muros.rclc.groups import ExecutorThread
+from muros.rclc.host.groups import ExecutorThread
 
 from std_msgs.msg import Int32
 

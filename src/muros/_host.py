@@ -93,20 +93,20 @@ HOSTS = {
 hosts Session
 """,
     "rclc": """
-action_hosts ActionClient ActionServer
-host_entities Client Publisher Service
-host_events Event
-host_executor Executor
-host_handles GuardCondition Subscription Timer
-hosts Context Node
-groups BEST_EFFORT CallbackGroup REAL_TIME_CRITICAL RealTimeClass SOFT_REAL_TIME ThreadError Threads
-sense_plan_act SensePlanAct
-workers Workers
-host_clock Clock
-host_graph Endpoint Graph
-host_parameters Parameters
-parameter_files ParameterClient
-remapping ArgumentsError RosArguments remove_ros_arguments
+host.actions ActionClient ActionServer
+host.entities Client Publisher Service
+host.events Event
+host.executor Executor
+host.handles GuardCondition Subscription Timer
+host.context Context Node
+host.groups BEST_EFFORT CallbackGroup REAL_TIME_CRITICAL RealTimeClass SOFT_REAL_TIME ThreadError Threads
+host.sense_plan_act FAWKES_STAGES SensePlanAct
+host.workers Workers
+host.clock Clock
+host.graph Endpoint Graph
+host.parameters Parameters
+host.parameter_files ParameterClient
+host.remapping ArgumentsError RosArguments remove_ros_arguments
 """,
 }
 """Where public names are that only hosts have, or hosts have of their own; see ``exports``."""

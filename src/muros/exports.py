@@ -35,7 +35,7 @@ illegal TransitionError
 lifecycle Lifecycle
 lifecycle_client LifecycleClient
 logger Logger
-middleware register
+host.middleware register
 parameter_client ParameterClient
 parameter_errors ParameterError ParameterNotDeclaredError ParameterTypeError ParameterRejectedError
 parameters Parameter Parameters

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from muros.rclc import Context, Executor, Parameters
+from muros.rclc.host.parameter_files import fitting, read, write
 from muros.rclc.parameter_errors import InvalidParameterError
-from muros.rclc.parameter_files import fitting, read, write
 from tests.cli.scene import Scene, play
 
 

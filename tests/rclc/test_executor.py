@@ -686,7 +686,7 @@ class Named:
 
 @pytest.mark.parametrize("said", NAMED)
 def test_callbacks_are_called_by_name(local: InSpace, said: str) -> None:
-    from muros.rclc.host_handles import describe
+    from muros.rclc.host.handles import describe
 
     assert describe(NAMED[said](local.context)).replace("Named.", "") == said
 
@@ -738,7 +738,9 @@ def test_errors_bear_the_codes_of_the_c_library() -> None:
 
 
 def test_the_numbers_of_problems_are_told_apart() -> None:
-    from muros.rclc import host_executor, host_handles, let
+    from muros.rclc import let
+    from muros.rclc.host import executor as host_executor
+    from muros.rclc.host import handles as host_handles
     from muros.space import rclc
 
     ours = {let.OVERRUN, host_executor.CALLBACK, host_handles.MALFORMED}

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from muros.rclc import Context, Executor, all_of
-from muros.rclc.sense_plan_act import FAWKES_STAGES, ComponentError, SensePlanAct, State
+from muros.rclc.host.sense_plan_act import FAWKES_STAGES, ComponentError, SensePlanAct, State
 
 from std_msgs.msg import Int32, String
 

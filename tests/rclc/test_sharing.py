@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from muros.rclc import Context, Executor, GuardCondition, RclError, Threads
-from muros.rclc.sharing import Bell, Ended, Mailbox, Seat, share
+from muros.rclc.host.sharing import Bell, Ended, Mailbox, Seat, share
 
 from std_msgs.msg import Int32
 

@@ -8,7 +8,7 @@ import pytest
 
 from muros.client import Qos
 from muros.rclc import Executor, RclError
-from muros.rclc.hosts import Context
+from muros.rclc.host.context import Context
 from muros.space import CDR_BE, Durability, History, Reliability, Space, Topic, open_space
 from muros.space import Qos as SpaceQos
 from muros.space.rclc import ENCODING, NETWORK, NOT_SPUN, OTHER, PROBLEMS, SpaceMiddleware

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from muros.rclc import Context, Executor, Node
-from muros.rclc.host_graph import CLIENT, PUBLISHER, SERVER, SUBSCRIPTION
+from muros.rclc.host.graph import CLIENT, PUBLISHER, SERVER, SUBSCRIPTION
 from muros.space import open_space
 from tests.client.world import World
 from tests.rclc.test_rclc import two

@@ -11,7 +11,7 @@ import pytest
 from muros.client import Udp
 from muros.links import UdpLink
 from muros.rclc import Context, Executor, RosArguments
-from muros.rclc.remapping import remap, remap_node
+from muros.rclc.host.remapping import remap, remap_node
 from tests.client.agent_thread import RunningAgent
 from tests.dds.peers import Peer, environment, python_of, require, start
 from tests.rclc_space.ways import PATIENCE

@@ -8,8 +8,8 @@ import pytest
 
 from muros.client import Qos
 from muros.rclc import ThreadError, Workers, any_of
+from muros.rclc.host.workers import WorkerState
 from muros.rclc.scheduling import other
-from muros.rclc.workers import WorkerState
 from tests.rclc_space.conftest import WAYS
 from tests.rclc_space.crew import Crew, here, until
 from tests.rclc_space.ways import PATIENCE, Direct, ThroughAgent

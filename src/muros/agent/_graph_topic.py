@@ -92,7 +92,7 @@ class _Domain:
 
     def _graph(self) -> bytes:
         """The graph as it is now, serialised."""
-        from muros.rclc.host_graph import KINDS
+        from muros.rclc.host.graph import KINDS
         from muros.space.rclc._graph import endpoints_of, nodes_of
 
         graph = self._core.space.graph

@@ -25,6 +25,12 @@ BOARD_FLOOR = (
 )  # fmt: skip
 """The rooms below ``muros/`` that boards import."""
 
+SOURCES = Path(muros.__file__).parent.parent
+"""The folder that holds ``muros/``."""
+
+HOST_FOLDERS = ("muros/rclc/host", "muros/rosserial/server")
+"""Folders in a board-floor package whose modules are all for hosts."""
+
 HOST_ONLY = frozenset(
     {
         "muros/client/_types.py",
@@ -32,50 +38,8 @@ HOST_ONLY = frozenset(
         "muros/client/reasons.py",
         "muros/client/sharing.py",
         "muros/rclc/_types.py",
-        "muros/rclc/action_hosts.py",
-        "muros/rclc/groups.py",
-        "muros/rclc/host_async.py",
-        "muros/rclc/host_checks.py",
-        "muros/rclc/host_clock.py",
-        "muros/rclc/host_entities.py",
-        "muros/rclc/host_events.py",
-        "muros/rclc/host_executor.py",
-        "muros/rclc/host_expiry.py",
-        "muros/rclc/host_graph.py",
-        "muros/rclc/host_handles.py",
-        "muros/rclc/host_let.py",
-        "muros/rclc/host_logger.py",
-        "muros/rclc/host_memory.py",
-        "muros/rclc/host_parameters.py",
-        "muros/rclc/host_waiting.py",
-        "muros/rclc/hosts.py",
-        "muros/rclc/middleware.py",
-        "muros/rclc/outlet.py",
-        "muros/rclc/parameter_files.py",
-        "muros/rclc/remapping.py",
         "muros/rclc/scheduling.py",
-        "muros/rclc/sense_plan_act.py",
-        "muros/rclc/sharing.py",
-        "muros/rclc/workers.py",
         "muros/rosserial/constants.py",
-        "muros/rosserial/server/__init__.py",
-        "muros/rosserial/server/_board.py",
-        "muros/rosserial/server/_core.py",
-        "muros/rosserial/server/_diagnosis.py",
-        "muros/rosserial/server/_door.py",
-        "muros/rosserial/server/_endpoints.py",
-        "muros/rosserial/server/_limits.py",
-        "muros/rosserial/server/_lines.py",
-        "muros/rosserial/server/_node_parameters.py",
-        "muros/rosserial/server/_output.py",
-        "muros/rosserial/server/_parameters.py",
-        "muros/rosserial/server/_ros1_world.py",
-        "muros/rosserial/server/_roster.py",
-        "muros/rosserial/server/_server.py",
-        "muros/rosserial/server/_space_world.py",
-        "muros/rosserial/server/_status.py",
-        "muros/rosserial/server/_worlds.py",
-        "muros/rosserial/server/events.py",
         "muros/rosserial/types.py",
         "muros/xrce/_crc.py",
         "muros/xrce/_types.py",
@@ -85,11 +49,12 @@ HOST_ONLY = frozenset(
         "muros/xrce/queues.py",
         "muros/xrce/representation.py",
     }
+).union(
+    path.relative_to(SOURCES).as_posix()
+    for folder in HOST_FOLDERS
+    for path in (SOURCES / folder).rglob("*.py")
 )
 """Modules that live in a board-floor package but are ordinary CPython: boards never load them."""
-
-SOURCES = Path(muros.__file__).parent.parent
-"""The folder that holds ``muros/``."""
 
 _TIMEOUT = 20  # seconds for one file
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from muros.cli._log import INFO
-from muros.rclc import parameter_files
+from muros.rclc.host import parameter_files
 from muros.rosserial.server import BAUD, NODE_NAME, TCP_PORT, flat
 
 __all__ = ["Options", "WrongUseError", "parameters_of", "parse", "take_settings"]

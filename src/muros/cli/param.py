@@ -16,7 +16,8 @@ from muros.cli._names import full_name, is_hidden, ros_services, service_of
 from muros.cli._tool import CommandError, Tool, positive
 from muros.cli.node import nodes_of
 from muros.cli.topic import command, unknown
-from muros.rclc import ParameterError, parameter_files
+from muros.rclc import ParameterError
+from muros.rclc.host import parameter_files
 from muros.rclc.parameter_values import TYPES, is_type, kind_of, put, take
 
 __all__ = ["delete", "describe", "dump", "get", "list_parameters", "load", "register", "set_parameter"]

@@ -9,7 +9,7 @@ from typing import Any, Final
 from muros.client.qos import Qos
 from muros.diagnostics._table import NOT_FOUND, Table
 from muros.interfaces import message
-from muros.rclc.hosts import Node
+from muros.rclc.host.context import Node
 
 __all__ = ["BOARDS", "TOOLS", "Bridge"]
 

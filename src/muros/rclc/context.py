@@ -19,7 +19,8 @@ class Context:
     """A way into the ROS graph: a transport to an agent, or a session of your own making.
 
     ``Context(Udp("192.168.1.10"))``, ``Context(Session(Udp("192.168.1.10"), queue=8))``. ``client_key`` is for a
-    session that is made here; a random one if it is None. On hosts ``muros.rclc.Context`` is a subclass, see ``hosts``.
+    session that is made here; a random one if it is None. On hosts ``muros.rclc.Context`` is a subclass, see
+    ``host.context``.
     """
 
     if TYPE_CHECKING:

@@ -60,7 +60,7 @@ class Epoch:
             return self.clock.time()
         if MPY:
             return (0, 0)
-        now: "tuple[int, int]" = borrow("muros.rclc.host_logger").system_time()
+        now: "tuple[int, int]" = borrow("muros.rclc.host.logger").system_time()
         return now
 
     def millis(self) -> int:

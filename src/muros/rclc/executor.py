@@ -4,7 +4,7 @@ One pass looks at every handle in turn; what is ready gives one piece of work to
 executor lets the middleware work and waits for whatever comes first: a message, a timer, or a deadline of the
 middleware. What programs ask of executors and handles now and then boards borrow, see ``handles``; what only some
 executors do, logical execution time and callbacks without data, is in ``let`` and ``always``, which put a pass of their
-own in the place of ``work``. Hosts have more, see ``host_executor``.
+own in the place of ``work``. Hosts have more, see ``host.executor``.
 """
 
 from muros.compat import const, lend, ticks_add, ticks_diff

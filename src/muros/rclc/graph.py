@@ -3,7 +3,7 @@
 An agent publishes the whole graph on the topic ``ros_to_microros_graph`` whenever it changes, as the agent of micro-ROS
 does: reliable, the last sample kept for those who come later. A sample is a micro_ros_msgs/msg/Graph: for each node its
 namespace, its name and its entities; for each entity what it is, its name and its types. Boards load this when they
-use it; hosts have more, see ``host_graph``.
+use it; hosts have more, see ``host.graph``.
 """
 
 from muros.cdr_texts import count, part, text

@@ -12,7 +12,7 @@ A callback that ends later than its let overruns. That is counted, told, and has
 An executor without a period has periods as long as its passes are: outputs leave at the end of the pass.
 
 Boards load this only for executors that ask for it. There what is published is held back by standing in for the
-backlog of the session, see ``let_outputs``; hosts do it for each thread, see ``host_let``.
+backlog of the session, see ``let_outputs``; hosts do it for each thread, see ``host.let``.
 """
 
 from muros.compat import const, ticks_diff

@@ -104,7 +104,7 @@ class Logger:
         return taken
 
     def locate(self, message: "Any") -> None:
-        """Says where in the program this is: on hosts alone, see ``host_logger``."""
+        """Says where in the program this is: on hosts alone, see ``host.logger``."""
 
 
 def begin(

@@ -14,7 +14,7 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
 
-    from muros.rclc import host_memory
+    from muros.rclc.host import memory as host_memory
     from muros.rclc.subscription import Subscription
     from muros.xrce._types import Buffer
 
@@ -41,7 +41,7 @@ class Rules:
     default for ``strings``, for sequences of ``messages`` or strings, and of ``numbers``; 0 means the default. Raises
     ValueError for sizes below 0.
 
-    Hosts also say what that makes, see ``host_memory``: ``capacities(kind)``, ``size(kind)``, ``longest(kind)``.
+    Hosts also say what that makes, see ``host.memory``: ``capacities(kind)``, ``size(kind)``, ``longest(kind)``.
     """
 
     if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class Rules:
         def __getattr__(self, name):
             if MPY or name[0] == "_":
                 raise AttributeError(name)
-            return lend(self, "muros.rclc.host_memory", name)
+            return lend(self, "muros.rclc.host.memory", name)
 
     def __init__(
         self,

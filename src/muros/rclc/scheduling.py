@@ -20,7 +20,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any, Final
 
-from muros.rclc.host_checks import WrongTypeError, WrongValueError
+from muros.rclc.host.checks import WrongTypeError, WrongValueError
 
 __all__ = [
     "CRITICAL_PRIORITY",

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Subscription(Handle):
-    """Made by ``Node.subscription``. One message waits, on hosts as many as the depth of the QoS, see ``hosts``.
+    """Made by ``Node.subscription``. One message waits, on hosts as many as the depth of the QoS, see ``host.context``.
 
     When one more comes, an executor that only waits for new data has the oldest processed at once, so none is lost;
     with a trigger or LET the oldest is dropped and counted in ``lost``. ``malformed`` counts samples that are no

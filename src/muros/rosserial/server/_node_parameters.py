@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from muros import interfaces
+from muros.rclc.host.parameter_files import kind
 from muros.rclc.parameter_errors import ParameterError
-from muros.rclc.parameter_files import kind
 from muros.rclc.parameters import Parameters
 from muros.space import Participant, Qos, Service, Topic, Writer
 

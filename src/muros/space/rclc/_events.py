@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from muros.findings import Finding
-from muros.rclc.host_events import DEADLINE_MISSED, INCOMPATIBLE_QOS, LIVELINESS_LOST, MATCHED, MESSAGE_LOST
+from muros.rclc.host.events import DEADLINE_MISSED, INCOMPATIBLE_QOS, LIVELINESS_LOST, MATCHED, MESSAGE_LOST
 from muros.space._graph import GraphEvent, Incompatible, Matched, Unmatched
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ _SILENCE = ("writer-silent", "liveliness-lost")
 
 
 class SpaceEvents:
-    """Counts what happens to a writer or reader; see `muros.rclc.host_events.EventSource`."""
+    """Counts what happens to a writer or reader; see `muros.rclc.host.events.EventSource`."""
 
     names: tuple[str, ...] = (DEADLINE_MISSED, INCOMPATIBLE_QOS, LIVELINESS_LOST, MATCHED, MESSAGE_LOST)
 

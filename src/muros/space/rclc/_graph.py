@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from muros.interfaces import InterfaceError, ros_topic, ros_type_name
-from muros.rclc.host_graph import CLIENT, PUBLISHER, SERVER, SUBSCRIPTION, Endpoint
+from muros.rclc.host.graph import CLIENT, PUBLISHER, SERVER, SUBSCRIPTION, Endpoint
 from muros.space import _graph
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ __all__ = ["SpaceGraph", "endpoints_of", "nodes_of"]
 
 
 class SpaceGraph:
-    """What a node sees of its domain; see `muros.rclc.host_graph.GraphSource`."""
+    """What a node sees of its domain; see `muros.rclc.host.graph.GraphSource`."""
 
     known = True
 

@@ -48,7 +48,7 @@ def open_way(way: str | Space, domain: int | None = None) -> SpaceMiddleware:
 
 def _of_url(url: str, domain: int | None) -> Ground:
     """The ground of a URL, made if there is none yet."""
-    wrong = import_module("muros.rclc.host_checks").WrongValueError
+    wrong = import_module("muros.rclc.host.checks").WrongValueError
     engine, _, rest = url.partition(":")
     if rest.isascii() and rest.isdigit():
         if int(rest) > LARGEST_DOMAIN:

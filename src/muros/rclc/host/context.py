@@ -16,10 +16,12 @@ from muros.client.hosts import Session
 from muros.client.names import topic_name
 from muros.client.qos import profile
 from muros.rclc import context as context_
-from muros.rclc import contexts, host_logger, remapping
+from muros.rclc import contexts
 from muros.rclc import node as node_
 from muros.rclc.errors import InvalidNameError, RclError
-from muros.rclc.host_checks import (
+from muros.rclc.host import logger as host_logger
+from muros.rclc.host import remapping
+from muros.rclc.host.checks import (
     NODE_INVALID_NAMESPACE,
     SERVICE_NAME_INVALID,
     TOPIC_NAME_INVALID,
@@ -33,27 +35,27 @@ from muros.rclc.host_checks import (
     invalid,
     is_token,
 )
-from muros.rclc.host_entities import Client, Publisher, Service
-from muros.rclc.host_handles import Subscription, Timer, ticks
-from muros.rclc.host_waiting import spin_until
-from muros.rclc.middleware import _engines, open_url
-from muros.rclc.remapping import RosArguments
+from muros.rclc.host.entities import Client, Publisher, Service
+from muros.rclc.host.handles import Subscription, Timer, ticks
+from muros.rclc.host.middleware import _engines, open_url
+from muros.rclc.host.remapping import RosArguments
+from muros.rclc.host.waiting import spin_until
 
 if TYPE_CHECKING:
     from typing import Unpack
 
     from muros.client._types import SessionOptions
     from muros.client.qos import Qos
-    from muros.rclc.action_hosts import ActionClient, ActionServer
     from muros.rclc.goals import Goal
-    from muros.rclc.host_clock import Clock
-    from muros.rclc.host_events import Event, Events
-    from muros.rclc.host_graph import Graph
-    from muros.rclc.host_parameters import Parameters
+    from muros.rclc.host.actions import ActionClient, ActionServer
+    from muros.rclc.host.clock import Clock
+    from muros.rclc.host.events import Event, Events
+    from muros.rclc.host.graph import Graph
+    from muros.rclc.host.parameters import Parameters
+    from muros.rclc.host.sharing import Sharing
     from muros.rclc.lifecycle import Lifecycle
     from muros.rclc.logger import Logger
     from muros.rclc.memory import Rules
-    from muros.rclc.sharing import Sharing
 
 Made = TypeVar("Made", "Client", "Service", "Subscription")
 
@@ -286,8 +288,8 @@ class Node(context_.Node):
         """
         if self._resolve("~/get_parameters") in self.context.services:
             raise RclError(f"node {self.name!r} has parameters already: keep what parameters() gave")
-        from muros.rclc.host_parameters import Parameters
-        from muros.rclc.parameter_files import kind
+        from muros.rclc.host.parameter_files import kind
+        from muros.rclc.host.parameters import Parameters
 
         options = (max, notify, undeclared, low_memory, longest, kind, time_ns)
         made = self.__dict__["_parameters"] = Parameters(self, *options)
@@ -302,7 +304,7 @@ class Node(context_.Node):
         ``liveliness_lost``, of which an agent does not tell (RclError with code 3, unsupported). ``destroy()`` of the
         handle ends it.
         """
-        from muros.rclc.host_events import make
+        from muros.rclc.host.events import make
 
         return make(self, entity, callbacks)
 
@@ -311,7 +313,7 @@ class Node(context_.Node):
         """The graph as this node sees it, from when it is first used: nodes, topics, services, and waiting for them."""
         made: Graph | None = self.__dict__.get("_graph")
         if made is None:
-            from muros.rclc.host_graph import Graph
+            from muros.rclc.host.graph import Graph
 
             made = self.__dict__["_graph"] = Graph(self)
         return made
@@ -321,7 +323,7 @@ class Node(context_.Node):
         """The clock of the node, made when it is first used: the system's, or /clock's with ``use_sim_time``."""
         made: Clock | None = self.__dict__.get("_clock")
         if made is None:
-            from muros.rclc.host_clock import Clock
+            from muros.rclc.host.clock import Clock
 
             made = self.__dict__["_clock"] = Clock(self)
             made.follow(self.__dict__.get("_parameters"))
@@ -341,14 +343,14 @@ class Node(context_.Node):
         clock: Callable[[], tuple[int, int]] | None = None,
     ) -> ActionServer:
         """A server of an action; see ``muros.rclc.node.action_server``. Stamps are of the computer's clock."""
-        from muros.rclc.action_hosts import make_server
+        from muros.rclc.host.actions import make_server
 
         functions = (on_execute, on_goal, on_cancel, on_accepted)
         return make_server(self, kind, name, functions, (goals, results, result_timeout), clock)
 
     def action_client(self, kind: Any, name: str, goals: int = 0) -> ActionClient:
         """A client of an action, with at most ``goals`` on their way (0: any number)."""
-        from muros.rclc.action_hosts import make_client
+        from muros.rclc.host.actions import make_client
 
         return make_client(self, kind, name, goals)
 
@@ -382,14 +384,14 @@ class Node(context_.Node):
     ) -> Subscription:
         if not profile(qos).lifespan:
             return Subscription(self.context, kind, callback, qos)
-        from muros.rclc.host_expiry import ExpiringSubscription
+        from muros.rclc.host.expiry import ExpiringSubscription
 
         return ExpiringSubscription(self.context, kind, callback, qos)
 
     def _service(self, kind: Any, callback: Callable[[Any], Any], qos: str | Qos) -> Service:
         if not profile(qos).lifespan:
             return Service(self.context, kind, callback)
-        from muros.rclc.host_expiry import ExpiringService
+        from muros.rclc.host.expiry import ExpiringService
 
         return ExpiringService(self.context, kind, callback, qos)
 

@@ -1,7 +1,7 @@
 """Where what a thread publishes goes: out, or to the task of LET whose callback it runs. For hosts.
 
 `Publisher.publish`, `Service.reply` and `Client.send` ask `outlet.task`, which is None unless this thread runs a
-callback of an executor with logical execution time (see `let` and `host_let`).
+callback of an executor with logical execution time (see `let` and `host.let`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from muros.rclc.host_let import HostTask
+    from muros.rclc.host.let import HostTask
 
 
 LOG_TOPIC = "/rosout"

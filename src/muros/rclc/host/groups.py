@@ -27,14 +27,14 @@ from typing import TYPE_CHECKING, Any, Final
 from muros.rclc import scheduling
 from muros.rclc.context import Context as AnyContext
 from muros.rclc.errors import RclError
-from muros.rclc.host_checks import WrongTypeError
-from muros.rclc.host_executor import Executor
-from muros.rclc.host_handles import describe, tell_problem
+from muros.rclc.host.checks import WrongTypeError
+from muros.rclc.host.executor import Executor
+from muros.rclc.host.handles import describe, tell_problem
+from muros.rclc.host.sharing import Ended, Seat, share
 from muros.rclc.scheduling import Policy
-from muros.rclc.sharing import Ended, Seat, share
 
 if TYPE_CHECKING:
-    from muros.rclc.hosts import Context, Node
+    from muros.rclc.host.context import Context, Node
 
 __all__ = [
     "BEST_EFFORT",

@@ -9,10 +9,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from muros.rclc import logger
-from muros.rclc.host_checks import WrongValueError
+from muros.rclc.host.checks import WrongValueError
 
 if TYPE_CHECKING:
-    from muros.rclc.hosts import Node
+    from muros.rclc.host.context import Node
 
 LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 

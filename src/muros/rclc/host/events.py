@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 from muros.rclc import handles
 from muros.rclc.errors import RclError
 from muros.rclc.executor import _NEVER, Handle
-from muros.rclc.host_checks import WrongTypeError, be_callable
-from muros.rclc.host_entities import Publisher
+from muros.rclc.host.checks import WrongTypeError, be_callable
+from muros.rclc.host.entities import Publisher
 from muros.rclc.subscription import Subscription
 
 if TYPE_CHECKING:
-    from muros.rclc.hosts import Node
+    from muros.rclc.host.context import Node
     from muros.xrce._types import Buffer
 
 __all__ = ["Event", "EventSource", "Events", "SessionEvents", "make"]

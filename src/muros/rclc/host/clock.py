@@ -13,13 +13,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from muros.rclc import handles
-from muros.rclc.host_logger import system_time
+from muros.rclc.host.logger import system_time
 from muros.rclc.ros_time import RosTime, RosTimer, clock_class
 from muros.rclc.timer import Timer
 
 if TYPE_CHECKING:
-    from muros.rclc.host_parameters import Parameters
-    from muros.rclc.hosts import Node
+    from muros.rclc.host.context import Node
+    from muros.rclc.host.parameters import Parameters
 
 __all__ = ["USE_SIM_TIME", "Clock", "ClockTimer"]
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # asyncio is imported where it is used: programs that have no loop need not load it
     import asyncio
 
-    from muros.rclc.host_executor import Executor
+    from muros.rclc.host.executor import Executor
 
     Came = asyncio.Future[bool]  # done when a wait is over; whether the thread that waited has said so
 

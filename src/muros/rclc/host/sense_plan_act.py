@@ -37,10 +37,10 @@ from muros.client import reasons
 from muros.rclc import scheduling
 from muros.rclc.errors import RclError
 from muros.rclc.executor import Executor
-from muros.rclc.host_checks import WrongTypeError, WrongValueError
-from muros.rclc.host_handles import tell_problem
+from muros.rclc.host.checks import WrongTypeError, WrongValueError
+from muros.rclc.host.handles import tell_problem
+from muros.rclc.host.sharing import Bell
 from muros.rclc.scheduling import Policy
-from muros.rclc.sharing import Bell
 
 __all__ = ["FAWKES_STAGES", "Component", "ComponentError", "SensePlanAct", "State"]
 

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from muros.rclc import parameter_making, parameter_rules, parameters
+from muros.rclc.host.parameter_files import fitting, kind
 from muros.rclc.parameter_errors import ParameterTypeError
-from muros.rclc.parameter_files import fitting, kind
 from muros.rclc.parameter_values import TYPES, kind_of
 
 if TYPE_CHECKING:
-    from muros.rclc.hosts import Node
+    from muros.rclc.host.context import Node
 
 __all__ = ["Parameters"]
 

@@ -16,8 +16,8 @@ from collections.abc import Callable, Collection, Iterable
 from enum import Enum
 from typing import Any
 
-from muros.rclc.groups import ExecutorThread, Threads
-from muros.rclc.host_checks import WrongValueError, be_callable
+from muros.rclc.host.checks import WrongValueError, be_callable
+from muros.rclc.host.groups import ExecutorThread, Threads
 from muros.rclc.scheduling import Policy
 from muros.rclc.semantics import ALWAYS
 from muros.rclc.triggers import all_of

@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 from muros.rclc import graph as topic
 from muros.rclc import handles
 from muros.rclc.executor import Handle
-from muros.rclc.host_handles import tell_problem
-from muros.rclc.host_waiting import spin_until
+from muros.rclc.host.handles import tell_problem
+from muros.rclc.host.waiting import spin_until
 
 if TYPE_CHECKING:
     from muros.rclc.context import Context
-    from muros.rclc.hosts import Node
+    from muros.rclc.host.context import Node
     from muros.xrce._types import Buffer
 
 __all__ = ["AgentGraph", "Endpoint", "Graph", "GraphSource", "GraphWatch"]

@@ -10,14 +10,14 @@ from muros.rclc import client as client_
 from muros.rclc import handles
 from muros.rclc import service as service_
 from muros.rclc.errors import RclError
-from muros.rclc.host_checks import WrongTypeError, be_callable, called, fits, other
-from muros.rclc.host_waiting import wait_confirmed
-from muros.rclc.outlet import LOG_TOPIC, body, outlet
-from muros.rclc.sharing import call_elsewhere, hand_over
+from muros.rclc.host.checks import WrongTypeError, be_callable, called, fits, other
+from muros.rclc.host.outlet import LOG_TOPIC, body, outlet
+from muros.rclc.host.sharing import call_elsewhere, hand_over
+from muros.rclc.host.waiting import wait_confirmed
 
 if TYPE_CHECKING:
     from muros.rclc._types import Publisher as AnyPublisher
-    from muros.rclc.hosts import Context, Node
+    from muros.rclc.host.context import Context, Node
 
 
 class Publisher:

@@ -1,4 +1,4 @@
-"""Actions on hosts: what boards have, and checks of what is asked for. See ``hosts``."""
+"""Actions on hosts: what boards have, and checks of what is asked for. See ``host.context``."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from muros.rclc import action_client as client_
 from muros.rclc import action_server as server_
 from muros.rclc import actions, goals
 from muros.rclc.errors import RclError
-from muros.rclc.host_checks import WrongTypeError, WrongValueError, be_callable, fits, no_class, other
-from muros.rclc.sharing import call_elsewhere, hand_over
+from muros.rclc.host.checks import WrongTypeError, WrongValueError, be_callable, fits, no_class, other
+from muros.rclc.host.sharing import call_elsewhere, hand_over
 
 if TYPE_CHECKING:
-    from muros.rclc.hosts import Context, Node
+    from muros.rclc.host.context import Context, Node
 
 Callback = Callable[..., object] | None
 

@@ -18,7 +18,7 @@ from typing import Any, Final, NamedTuple
 
 from muros.client.names import resolve
 from muros.rclc.errors import RclError
-from muros.rclc.host_logger import LEVELS
+from muros.rclc.host.logger import LEVELS
 
 __all__ = ["ArgumentsError", "RosArguments", "Rule", "remove_ros_arguments", "rules_of"]
 
@@ -77,7 +77,7 @@ class RosArguments(NamedTuple):
 
     def parameters(self, node: str) -> dict[str, Any]:
         """What is said of the parameters of a node, by its full name."""
-        matches = import_module("muros.rclc.parameter_files").matches
+        matches = import_module("muros.rclc.host.parameter_files").matches
         found: dict[str, Any] = {}
         for pattern, values in self.values:
             if matches(pattern, node):
@@ -275,7 +275,7 @@ def _parameter(text: str) -> tuple[str, Mapping[str, Any]]:
 
 def _file(name: str) -> list[tuple[str, Mapping[str, Any]]]:
     """What a file says, node by node; what names a node exactly comes last."""
-    files = import_module("muros.rclc.parameter_files")
+    files = import_module("muros.rclc.host.parameter_files")
     try:
         with open(name, encoding="utf-8") as file:
             text = file.read()

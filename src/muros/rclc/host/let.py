@@ -18,13 +18,13 @@ from typing import TYPE_CHECKING, Any
 
 from muros.client.raw import Raw
 from muros.rclc.errors import CapacityError
-from muros.rclc.host_handles import describe, tell_problem
+from muros.rclc.host.handles import describe, tell_problem
+from muros.rclc.host.outlet import body, outlet
 from muros.rclc.let import OVERRUN, Let, Task
-from muros.rclc.outlet import body, outlet
 from muros.rclc.overruns import LOW_PRIORITY
 
 if TYPE_CHECKING:
-    from muros.rclc.host_executor import Executor
+    from muros.rclc.host.executor import Executor
 
 
 _LOW = 10

@@ -10,8 +10,8 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from muros.client.qos import profile
-from muros.rclc.host_entities import Service
-from muros.rclc.host_handles import Subscription
+from muros.rclc.host.entities import Service
+from muros.rclc.host.handles import Subscription
 
 if TYPE_CHECKING:
     from collections.abc import Callable

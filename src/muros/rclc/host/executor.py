@@ -2,10 +2,10 @@
 
 Theory of operation. Each way of spinning is written once, as a generator that makes passes and yields how many
 milliseconds it may wait in between. Who waits is somebody else: ``_drive`` has the middleware wait, ``_drive_async``
-an asyncio program (see ``host_async``). So both do the same at the same times.
+an asyncio program (see ``host.awaiting``). So both do the same at the same times.
 
 A pass lets the middleware work, asks the trigger, and runs what is ready in the order of adding. With LET a pass is
-a period, see ``let`` and ``host_let``.
+a period, see ``let`` and ``host.let``.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from muros.rclc import context as context_
 from muros.rclc import executor as executor_
 from muros.rclc import handles
 from muros.rclc.handle_error import HandleError
-from muros.rclc.host_async import Sleeper, pause
-from muros.rclc.host_checks import WrongTypeError, WrongValueError, be_callable
-from muros.rclc.host_handles import describe, tell_problem, ticks
-from muros.rclc.host_let import HostLet, HostTask
+from muros.rclc.host.awaiting import Sleeper, pause
+from muros.rclc.host.checks import WrongTypeError, WrongValueError, be_callable
+from muros.rclc.host.handles import describe, tell_problem, ticks
+from muros.rclc.host.let import HostLet, HostTask
 from muros.rclc.overruns import GO_ON, LOW_PRIORITY
 from muros.rclc.semantics import ALWAYS, LET, ON_NEW_DATA, RCLCPP
 

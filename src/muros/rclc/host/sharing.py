@@ -34,12 +34,12 @@ from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
 from muros.rclc.errors import RclError
-from muros.rclc.host_handles import GuardCondition, Timer
+from muros.rclc.host.handles import GuardCondition, Timer
 
 if TYPE_CHECKING:
     from muros.client.qos import Qos
     from muros.rclc._types import Entity, Publisher, Replier, Requester
-    from muros.rclc.hosts import Context
+    from muros.rclc.host.context import Context
 
 __all__ = ["Bell", "Ended", "Seat", "Sharing", "call_elsewhere", "hand_over", "share"]
 
