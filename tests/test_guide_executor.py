@@ -30,7 +30,9 @@ def test_a_program_prints_what_it_should(number: int) -> None:
         timeout=40,
         env=dict(os.environ),
     )
-    assert (done.stdout, done.stderr, done.returncode) == (OUTPUTS[number], "", 0)
+    # A machine that is busy makes callbacks late, and that is told.
+    told = [line for line in done.stderr.splitlines() if "behind its let" not in line]
+    assert (done.stdout, told, done.returncode) == (OUTPUTS[number], [], 0)
 
 
 def test_no_program_goes_untested() -> None:

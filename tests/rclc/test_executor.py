@@ -581,6 +581,19 @@ def test_spin_until(local: InSpace) -> None:
     assert not executor.spin_until(lambda: False)
 
 
+def test_spin_until_looks_whenever_a_wait_has_ended(local: InSpace) -> None:
+    """What the middleware itself brings about, a state or a match, is no news for a handle."""
+    came: list[int] = []
+
+    def woken_early() -> None:
+        came.append(1)
+        local.now -= 200
+
+    local.on_wait = woken_early
+    assert local.executor(timeout=0.3).spin_until(lambda: came)
+    assert local.waits == [300]
+
+
 def test_a_round_of_spin_waits_as_long_as_it_is_told(local: InSpace) -> None:
     executor = local.executor(timeout=0.3)
     executor.add(GuardCondition(local.context, print))

@@ -1,5 +1,6 @@
 """Logging: what is published and shown, from which level on, and what becomes of what cannot be published."""
 
+import threading
 from typing import Any
 
 import pytest
@@ -120,3 +121,21 @@ def test_the_node_s_own_logger(capsys: pytest.CaptureFixture[str]) -> None:
     node.log.info("hello")
     assert node.log is node.log
     assert capsys.readouterr().err.endswith("] [camera]: hello\n")
+
+
+def test_another_thread_may_log_while_one_publishes() -> None:
+    logged = Logged()
+    publisher: Any = logged.log.publisher
+
+    def publish(message: Any) -> bool:
+        if message.msg == "first":
+            other = threading.Thread(target=logged.log.info, args=("of another thread",))
+            other.start()
+            other.join()
+            logged.log.info("of a problem of publishing")  # is shown, and no more
+        return logged._publish(message)
+
+    publisher.publish = publish
+    assert logged.log.info("first")
+    assert [message.msg for message in logged.published] == ["of another thread", "first"]
+    assert logged.log.lost == 1

@@ -326,12 +326,13 @@ class Executor(executor_.Executor):
             yield from self._round(self.timeout)
             yield 0.0
 
-    def _round(self, timeout: float) -> Steps[bool]:
+    def _round(self, timeout: float, over: Callable[[], object] | None = None) -> Steps[bool]:
+        """Waits for one pass, at most ``timeout`` ms and until ``over()``; asked whenever anything has come."""
         context = self.context
         now = context.clock()
         end = now + timeout
         while not self.work(now, now >= end):
-            if now >= end or not self._going():
+            if now >= end or not self._going() or (over is not None and over()):
                 return False
             left = min(end - now, context.middleware.deadline(now))
             for handle in self.handles:
@@ -350,7 +351,7 @@ class Executor(executor_.Executor):
             if self.let is not None and self.period:
                 yield from self._one_period(self.period)
             else:
-                yield from self._round(min(left, self.timeout))
+                yield from self._round(min(left, self.timeout), condition)
             yield 0.0
         return True
 

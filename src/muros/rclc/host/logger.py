@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time as clock
 from collections.abc import Callable
 from importlib import import_module
@@ -17,8 +18,25 @@ if TYPE_CHECKING:
 LEVELS = {"debug": 10, "info": 20, "warn": 30, "error": 40, "fatal": 50}
 
 
+class _Thread(threading.local):
+    busy = False
+
+
 class Logger(logger.Logger):
-    """Made by ``Node.logger``; see ``muros.rclc.logger.Logger``."""
+    """Made by ``Node.logger``; see ``muros.rclc.logger.Logger``. Any thread may log."""
+
+    def __init__(self, *arguments: Any) -> None:
+        self._thread = _Thread()
+        super().__init__(*arguments)
+
+    @property
+    def _busy(self) -> bool:
+        """Whether this thread publishes a text right now."""
+        return self._thread.busy
+
+    @_busy.setter
+    def _busy(self, busy: bool) -> None:
+        self._thread.busy = busy
 
     def log(self, level: int, text: str) -> bool:
         """Publishes a text of a level, and whatever else is given as its text. Raises ValueError for no level."""

@@ -24,7 +24,6 @@ While the carrier does not run, everything passes straight through.
 
 from __future__ import annotations
 
-import asyncio
 import threading
 import time
 from collections import deque
@@ -412,6 +411,8 @@ class Sharing:
 
     async def wait_async(self, timeout: float, /) -> None:
         """``wait`` in an asyncio program, whose loop goes on meanwhile."""
+        import asyncio  # programs without a loop need not load it
+
         if self.carrier is None:
             await asyncio.sleep(min(timeout, _LOOK) / 1000)
             return
