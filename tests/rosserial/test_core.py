@@ -886,3 +886,108 @@ def test_who_never_spoke_leaves_nothing_behind() -> None:
     scene.writer("/led_out", BYTE)(data=1)
     scene.step(2)
     assert board.taken(led) == [b"\x01"]
+
+
+@pytest.mark.parametrize("how", ["pulled", "silent"])
+def test_a_call_that_comes_while_the_board_is_away_is_made_when_it_is_back(how: str) -> None:
+    scene = Scene()
+    board = RosLib(scene)
+    responses, requests = board.server("switch", "std_srvs/SetBool")
+    board.plug()
+    scene.step(1_000)
+    call, answers = scene.client("/switch", "std_srvs/srv/SetBool")
+    scene.step(10)
+    if how == "pulled":
+        board.pull()
+    else:
+        board.running = False
+        scene.step(5_000)
+    call(data=True)
+    scene.step(50)
+    board.boot()
+    board.running = True
+    if how == "pulled":
+        board.plug()
+    scene.until(lambda: board.got and board.got[-1] == (requests, b"\x01"))
+    board.send(responses, b"\x01" + string("on"))
+    scene.step(5)
+    assert [answer.message for answer in answers] == ["on"]
+
+
+def test_another_board_at_a_port_gets_nothing_on_the_ids_of_the_one_before() -> None:
+    scene = Scene()
+    board = RosLib(scene)
+    requests = board.server("switch", "std_srvs/SetBool")[1]
+    led = board.subscriber("led_out", "std_msgs/Byte")
+    board.plug()
+    scene.step(1_000)
+    call, _ = scene.client("/switch", "std_srvs/srv/SetBool")
+    switch = scene.writer("/led_out", BYTE)
+    scene.step(10)
+    board.pull()
+    switch(data=1)
+    call(data=True)
+    board.infos.clear()
+    board.boot()
+    board.plug()
+    scene.step(1_000)
+    assert board.connected
+    assert not board.taken(led) + board.taken(requests)
+
+
+def test_parameters_and_logs_before_the_board_was_asked() -> None:
+    scene = Scene({"rate": 50})
+    rosout = scene.reader("/rosout", "rcl_interfaces/msg/Log")
+    board = RosLib(scene)
+    board.plug()
+    board.ask("~rate")
+    board.log(1, "booting")
+    scene.step(1)
+    assert board.values is not None
+    assert board.values.ints == [50]
+    scene.step(5)
+    board.log(1, "booted")
+    scene.step(5)
+    assert [message.msg for message in rosout()][-1] == "booted"
+
+
+def test_boards_get_simulated_time_with_use_sim_time() -> None:
+    scene = Scene({"use_sim_time": True}, baud=57_600)
+    board, _, _ = led_board(scene)
+    assert board.taken(ID_TIME)[-1] == bytes(8)  # before /clock says anything, and not a moment before that
+    clock = scene.writer("/clock", "rosgraph_msgs/msg/Clock")
+    clock(clock=interfaces.message("builtin_interfaces/msg/Time")(sec=5, nanosec=6_000_000))
+    scene.step(3_000)
+    seconds, nanoseconds = struct.unpack("<II", board.taken(ID_TIME)[-1])
+    assert (seconds, round(nanoseconds / 1e6)) == (5, 3)  # less the time of the request on the line
+    call, answers = scene.client("/board_a/set_parameters", "rcl_interfaces/srv/SetParameters")
+    parameter = interfaces.message("rcl_interfaces/msg/Parameter")
+    value = interfaces.message("rcl_interfaces/msg/ParameterValue")
+    scene.step(5)
+    call(parameters=[parameter(name="use_sim_time", value=value(type=1, bool_value=False))])
+    scene.step(3_000)
+    assert answers
+    assert struct.unpack("<II", board.taken(ID_TIME)[-1])[0] >= START // 10**9
+    found = scene.space.graph.topic("rt/clock")
+    assert found is None or not found.readers
+
+
+def test_required_topics_are_asked_for_until_the_board_names_them() -> None:
+    scene = Scene({"require.publishers": ["chatter"], "require.subscribers": ["/led_out", "beep"]})
+    board, led, _ = led_board(scene)
+    scene.step(5_000)
+    assert 4 <= scene.core.boards[0].asks <= 7
+    assert {finding.subject for finding in scene.told if finding.code == "required-topic-missing"} == {
+        "subscriber beep"
+    }
+    scene.writer("/led_out", BYTE)(data=1)  # whatever it has works meanwhile
+    scene.step(5)
+    assert board.taken(led) == [b"\x01"]
+    beep = board.subscriber("beep", "std_msgs/Byte")
+    scene.step(2_000)
+    scene.writer("/beep", BYTE)(data=1)
+    scene.step(5)
+    assert board.taken(beep) == [b"\x01"]
+    asks = scene.core.boards[0].asks
+    scene.step(5_000)
+    assert scene.core.boards[0].asks == asks

@@ -332,6 +332,7 @@ class Board:
         if silence >= self._patience():
             self._pace = float(limits.silent)  # it may have become quiet
             self._step(SILENCE)
+            self.roster.doubt()
             self._ask(now)
         elif (
             limits.check
@@ -384,16 +385,16 @@ class Board:
         if self.state != SYNCED:
             self._heard_again(now)
             self._step(ANSWER)
+        self._meet()
+
+    def _meet(self) -> None:
+        """It is a board: it becomes a node, if it is none yet."""
         if self.node is None:
             try:
                 self.node = self.core.world.node(self.node_name, self.who)
             except RefusedError as error:
-                self.report(
-                    "node-refused",
-                    what=f"{self.who} cannot be the node {self.node_name}",
-                    why=error.why,
-                    remedy=error.remedy,
-                )
+                what = f"{self.who} cannot be the node {self.node_name}"
+                self.report("node-refused", what=what, why=error.why, remedy=error.remedy)
 
     def _heard_again(self, now: int) -> None:
         if self.lost_at is not None:
@@ -428,6 +429,10 @@ class Board:
             )
             if not self.roster.endpoints:
                 self.suspicions.no_topics()
+        if self.roster.lacks():
+            if now >= self._asked_at + self.core.limits.ask:
+                self._ask(now)
+            self._settle_at = self._asked_at + self.core.limits.ask
 
     def _lose(self, reason: str, now: int) -> None:
         if self.node is not None and self.lost_at is None:
@@ -502,19 +507,18 @@ class Board:
 
     def _time(self, now: int) -> None:
         """Answers with the time at which the request left the board, as the board adds the whole round trip to it."""
-        stamp = self.core.world.time() - round(_TIME_BYTES * self.output.byte_us * 1000)
+        arrived = (self.node or self.core.world).time()
+        if self.node is None:
+            self._meet()  # that takes a while, so time went on meanwhile, unless it is simulated
+            arrived = min(arrived, (self.node or self.core.world).time())
+        stamp = max(0, arrived - round(_TIME_BYTES * self.output.byte_us * 1000))
         body = bytearray(8)
         write_time(body, 0, stamp // 1_000_000_000 & 0xFFFFFFFF, stamp % 1_000_000_000)
         self.output.post(frame(ID_TIME, body, self.version))
         self.pump(now)
         last, self.last_time, self.connected_at = self.last_time, now, now
-        if (
-            self.state == SYNCED
-            and not self._open_asks
-            and last is not None
-            and now - last < _TIME_PERIOD
-            and self._settle_at is None
-        ):
+        early = last is not None and now - last < _TIME_PERIOD and self._settle_at is None
+        if early and self.state == SYNCED and not self._open_asks:
             self.resets += 1
             self.roster.restart()
             self.core.tell(BoardReset(self.label))
@@ -548,11 +552,13 @@ class Board:
 
     def _log(self, level: int, text: str) -> None:
         self.core.tell(BoardLog(self.label, level, text))
+        self._meet()
         if self.node is not None:
             self.node.log(level, text)
 
     def _parameter(self, name: str) -> None:
-        """Answers always and at once: without an answer the board's loop would stand still for a second."""
+        """Answers always, also unconnected boards: without an answer their loops stand still for a second."""
+        self._meet()
         value = self.node.parameter(name) if self.node is not None else None
         if value is None:
             self.report(

@@ -129,6 +129,9 @@ class Node(Protocol):
     ) -> Server:
         """A new service. Raises RefusedError."""
 
+    def time(self) -> int:
+        """The time of this node, in ns: its world's, or another where nodes have one of their own."""
+
     def log(self, level: int, text: str) -> None:
         """The board says something; levels are 0 debug to 4 fatal."""
 

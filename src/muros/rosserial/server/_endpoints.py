@@ -33,6 +33,8 @@ class Endpoint:
         self.round = 0
         """The number of the topic request that it was named after last."""
         self.shape = shape
+        self.confirmed = True
+        """Whether the board has named it since it may have started again, perhaps with other topics."""
 
     @property
     def says(self) -> tuple[Any, ...]:
@@ -79,6 +81,9 @@ class Endpoint:
 
     def restart(self) -> None:
         """The board has started again: whatever it waited for, it does not any more."""
+
+    def resume(self) -> None:
+        """The board has named it: what has waited meanwhile may go."""
 
     def close(self) -> None:
         """Takes it out of the world."""
@@ -133,6 +138,9 @@ class Subscription(Endpoint):
 
     def next(self, now: int) -> bytes | None:
         """The next frame for the board: the oldest message, or on a slow line the oldest of the newest few."""
+        if not self.confirmed:
+            self._queued = False
+            return None
         info = self.infos[0]
         if self.board.output.byte_us:
             self._hurry()
@@ -147,6 +155,10 @@ class Subscription(Endpoint):
     def restart(self) -> None:
         """What waited is for whom the board was."""
         self._waiting.clear()
+
+    def resume(self) -> None:
+        """What has waited in the world may go."""
+        self.on_data()
 
     def _take(self) -> bytes | None:
         assert self.subscriber is not None
@@ -222,7 +234,7 @@ class ServiceServer(Endpoint):
         board = self.board
         assert self.server is not None
         info = self.infos[1]
-        while board.in_sync:
+        while board.in_sync and self.confirmed:
             try:
                 taken = self.server.take()
             except BodyError as error:
@@ -267,6 +279,10 @@ class ServiceServer(Endpoint):
         if self.until is not None and not self._late:
             self._unanswered("the board started again")
         self.until = self._request = None
+
+    def resume(self) -> None:
+        """The calls that came while the board could not be called have their turn."""
+        self.on_data()
 
     def close(self) -> None:
         """Takes it out of the world."""

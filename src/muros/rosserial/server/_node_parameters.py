@@ -7,8 +7,8 @@ from typing import Any
 
 from muros import interfaces
 from muros.rclc.host.parameter_files import kind
+from muros.rclc.host.parameters import Parameters
 from muros.rclc.parameter_errors import ParameterError
-from muros.rclc.parameters import Parameters
 from muros.space import Participant, Qos, Service, Topic, Writer
 
 __all__ = ["PARAMETER_KINDS", "NodeParameters"]
@@ -25,9 +25,18 @@ PARAMETER_KINDS = (
 
 
 class NodeParameters:
-    """Parameters of a participant. Whoever wants may add some; ``values`` are the first ones."""
+    """Parameters of a participant. Whoever wants may add some; ``values`` are the first ones.
 
-    def __init__(self, participant: Participant, values: Mapping[str, Any], wall: Callable[[], int]) -> None:
+    ``on_applied`` is called after some of them may have changed.
+    """
+
+    def __init__(
+        self,
+        participant: Participant,
+        values: Mapping[str, Any],
+        wall: Callable[[], int],
+        on_applied: Callable[[], object],
+    ) -> None:
         node: Any = _Node(participant)
         self._parameters = Parameters(node, 0, True, True, False, 0, kind, wall)
         self.refused: list[str] = []
@@ -36,6 +45,7 @@ class NodeParameters:
                 self._parameters.declare(name, value)
             except ParameterError as error:
                 self.refused.append(str(error))
+        self._parameters.on_applied = on_applied
 
     def get(self, name: str) -> Any:
         """The value of a parameter; None if there is none."""
@@ -54,6 +64,7 @@ class _Node:
         self.name = participant.name
         self.namespace = participant.namespace
         self.context = _Context()
+        self.overrides: dict[str, Any] = {}
         self._participant = participant
 
     def service(self, type_: Any, name: str, answer: Callable[[Any], Any], qos: str) -> _Service:

@@ -215,6 +215,10 @@ class Ros1BoardNode:
         halves = _halves(type_name, request_md5, response_md5)
         return _Server(self, self.resolve(name, "service"), type_name, *halves, on_data)
 
+    def time(self) -> int:
+        """The graph's time in ns."""
+        return self.world.time()
+
     def log(self, level: int, text: str) -> None:
         """A board's log goes to /rosout, as that of any node."""
         strings = (self.node.name, text, "", "")

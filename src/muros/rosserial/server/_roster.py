@@ -72,6 +72,28 @@ class Roster:
         """What was not named after the last topic request."""
         return [each for each in self.endpoints.values() if each.round != self.board.round]
 
+    def lacks(self) -> bool:
+        """Whether the board has not named all of ``~require/publishers`` and ``~require/subscribers``.
+
+        A TopicInfo that got lost may be seen by nothing else.
+        """
+        board = self.board
+        lacks = False
+        for kind in (Publication, Subscription):
+            wanted = None if board.node is None else board.node.parameter(f"~require/{kind.kind}s")
+            there = {self._full(each.name) for each in self.endpoints.values() if isinstance(each, kind)}
+            for name in wanted if isinstance(wanted, list | tuple) else ():
+                if self._full(str(name)) not in there:
+                    lacks = True
+                    board.report(
+                        "required-topic-missing",
+                        subject=f"{kind.kind} {name}",
+                        what=f"Missing required topic: {board.who} has no {kind.kind} {name}",
+                        why=f"it is in ~require/{kind.kind}s of the node, and the board has not named it",
+                        remedy="Nothing if it comes, the board is asked again; else flash the firmware that has it",
+                    )
+        return lacks
+
     def halved(self) -> bool:
         """Whether only one half of some service was named."""
         return any(len(found) < 2 for _, found in self._halves.values())
@@ -88,8 +110,14 @@ class Roster:
 
     def restart(self) -> None:
         """The board has started again: it waits for nothing any more."""
+        self.doubt()
         for endpoint in self.endpoints.values():
             endpoint.restart()
+
+    def doubt(self) -> None:
+        """The board may have started again: nothing goes to an id until it has named it again."""
+        for endpoint in self.endpoints.values():
+            endpoint.confirmed = False
 
     def close(self) -> None:
         """Takes everything out of the world."""
@@ -109,6 +137,13 @@ class Roster:
             if getattr(self.incoming.get(info.topic_id), "__self__", None) is endpoint:
                 del self.incoming[info.topic_id]
         endpoint.close()
+
+    def _full(self, name: str) -> str:
+        """A name as the board's node means it."""
+        node = self.board.node_name
+        if name.startswith("~"):
+            return f"{node}/{name[1:].lstrip('/')}"
+        return name if name.startswith("/") else f"{node.rpartition('/')[0]}/{name}"
 
     def _other_half(self, branch: int, half: int, info: TopicInfo) -> tuple[TopicInfo, TopicInfo] | None:
         """Both halves of a service, None until both were named after one request."""
@@ -155,9 +190,11 @@ class Roster:
             self._said(known)
             self._warn(known)
         known.round = self.board.round
+        known.confirmed = True
         receive = getattr(known, "receive", None)
         if receive is not None:
             self.incoming[infos[0].topic_id] = receive
+        known.resume()
 
     def _release(self, key: Key, infos: tuple[TopicInfo, ...]) -> None:
         """Whoever else had these ids has them no more: the board has begun anew with other numbers."""

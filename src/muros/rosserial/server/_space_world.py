@@ -36,6 +36,7 @@ __all__ = ["SpaceNode", "SpaceWorld"]
 _LATCHED = frozenset({"/tf_static"})
 _LEVELS = (10, 20, 30, 40, 50)
 """Levels of rcl_interfaces/msg/Log for those of rosserial."""
+_USE_SIM_TIME = "use_sim_time"
 _STATUS = ("OK", "WARN", "ERROR")
 _READ_DEPTH = 32
 """Messages that wait for a board whose line is slower; the oldest go first."""
@@ -129,7 +130,11 @@ class SpaceNode:
         self.subscribers: list[_Subscriber] = []
         self._namespace = participant.namespace.rstrip("/")
         self.full_name = f"{self._namespace}/{participant.name}"
-        self._values = NodeParameters(participant, parameters, world.time)
+        self._clock: Reader | None = None
+        self._simulated = 0
+        given = {_USE_SIM_TIME: False, **parameters}
+        self._values = NodeParameters(participant, given, world.time, self._follow_clock)
+        self._follow_clock()
         self._log_type = interfaces.message("rcl_interfaces/msg/Log")
         self._rosout = participant.writer(
             Topic(interfaces.dds_topic("/rosout"), interfaces.dds_type_name("rcl_interfaces/msg/Log")),
@@ -172,9 +177,13 @@ class SpaceNode:
         service, request, response = self._service(name, type_name, request_md5, response_md5)
         return _Server(self, service, request, response, on_data)
 
+    def time(self) -> int:
+        """The node's time in ns: the wall clock's, or that of /clock with the parameter use_sim_time."""
+        return self.world.time() if self._clock is None else self._simulated
+
     def log(self, level: int, text: str) -> None:
         """A board's log goes to /rosout, as that of any node."""
-        now = self.world.time()
+        now = self.time()
         message = self._log_type(
             level=_LEVELS[min(level, len(_LEVELS) - 1)],
             name=self.full_name.strip("/").replace("/", "."),
@@ -200,13 +209,36 @@ class SpaceNode:
             values=[pair(key=key, value=value) for key, value in values.items()],
         )
         array = interfaces.message("diagnostic_msgs/msg/DiagnosticArray")(status=[status])
-        array.header.stamp.sec, array.header.stamp.nanosec = divmod(self.world.time(), 1_000_000_000)
+        array.header.stamp.sec, array.header.stamp.nanosec = divmod(self.time(), 1_000_000_000)
         self._diagnostics.write(array.serialize())
 
     def close(self) -> None:
         """The node leaves the graph."""
         self.world.forget(self)
         self.participant.close()
+
+    def _follow_clock(self) -> None:
+        """Goes by /clock, or no more, as the parameter says; a simulation's time is 0 until something has come."""
+        simulated = self._values.get(_USE_SIM_TIME) is True
+        if simulated and self._clock is None:
+            kind = "rosgraph_msgs/msg/Clock"
+            self._simulated = 0
+            self._clock = self.participant.reader(
+                Topic(interfaces.dds_topic("/clock"), interfaces.dds_type_name(kind)),
+                Qos(Reliability.BEST_EFFORT, depth=1),
+                partial(self._on_clock, interfaces.message(kind)),
+            )
+        elif not simulated and self._clock is not None:
+            self._clock.close()
+            self._clock = None
+
+    def _on_clock(self, kind: Any, reader: Reader) -> None:
+        while (sample := reader.take()) is not None:
+            try:
+                now = kind.deserialize(sample.data).clock
+            except CdrError:
+                continue
+            self._simulated = now.sec * 1_000_000_000 + now.nanosec
 
     def _topic(self, name: str, type_name: str, md5: str) -> tuple[str, Converter]:
         full = self.world.expand(name, self.participant, "topic")

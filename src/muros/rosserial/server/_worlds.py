@@ -107,6 +107,10 @@ class _Nodes:
         )
         return _Servers(list(made.values()))
 
+    def time(self) -> int:
+        """The time of the first, in ns."""
+        return self._nodes[0].time()
+
     def log(self, level: int, text: str) -> None:
         """Everybody hears it."""
         for node in self._nodes:
