@@ -137,6 +137,81 @@ def test_x13_timers() -> None:
     assert calls == [100, 200, 300, 400, 500]
 
 
+def test_x14_x15_a_timer_cancels_itself_and_stops_no_messages() -> None:
+    bench = Bench()
+    calls: "list[int]" = []
+    got: "list[int]" = []
+
+    def call() -> None:
+        calls.append(bench.at())
+        if len(calls) == 3:
+            timer.cancel()
+
+    subscription = bench.node.subscription(Number, "a", lambda m: got.append(m.data))
+    bench.connect()
+    timer = bench.node.timer(0.1, call)
+    executor = bench.executor()
+    for _ in range(10):
+        executor.spin_some(0.05)
+    assert calls == [100, 200, 300]
+    for value in (1, 2, 3):
+        give(subscription, value)
+        assert executor.spin_some(0.05)
+    assert got == [1, 2, 3]
+    assert len(calls) == 3
+    timer.reset()
+    executor.spin_some(0.2)
+    assert len(calls) == 4
+
+
+def test_x18_x20_x31_the_order_of_adding() -> None:
+    bench = Bench()
+    got: "list[Any]" = []
+    made = [bench.node.subscription(Number, name, None) for name in ("a", "b", "c")]
+    bench.connect()
+    executor = bench.executor()
+
+    def noter(name: str) -> "Callable[[Any], object]":
+        return lambda message: got.append((name, message.data))
+
+    for i in range(3):
+        executor.add(made[i], noter("abc"[i]))
+    for order in ((0, 1, 2), (2, 1, 0), (1, 2, 0)):
+        for i in order:
+            give(made[i], 10 + i)
+        got.clear()
+        assert executor.spin_some()
+        assert got == [("a", 10), ("b", 11), ("c", 12)]
+    late = bench.node.subscription(Number, "d", None)
+    executor.add(late, noter("d"))
+    give(late, 13)
+    give(made[0], 14)
+    got.clear()
+    executor.spin_some()
+    assert got == [("a", 14), ("d", 13)]
+
+
+def test_x28_x29_x30_services() -> None:
+    bench = Bench()
+    seen: "list[bytes]" = []
+    offset = 42
+
+    def answer(request: "Any") -> Number:
+        seen.append(service.identity)
+        return number(request.data + offset)
+
+    service = bench.node.service(Service, "add", answer)
+    bench.connect()
+    executor = bench.executor()
+    for i in range(2):
+        service.deliver(bytes((i,)) * 24, bytes((i, 0, 0, 0)), 0, 4)
+    assert executor.spin_some()
+    assert executor.spin_some()
+    assert not executor.spin_some()
+    assert seen == [bytes(24), b"\1" * 24]
+    assert bench.written() == [42, 43]
+
+
 def test_x19_invocation() -> None:
     bench = Bench()
     got: "list[Any]" = []
