@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from muros.findings import Findings
-from muros.interfaces import converter, md5, message, ros1_text
+from muros.interfaces import converter, md5, message, ros1_text, service_converter
 from muros.ros1 import Ros1Error
+from muros.ros1._services import ServiceClient, ServiceType
 from muros.rosserial import types
 from muros.rosserial.server._door import BodyError, RefusedError
 from muros.rosserial.server._ros1_world import Ros1BoardNode, Ros1World
@@ -137,6 +138,24 @@ def test_services_both_ways(master: Master, ros: Peer) -> None:
             assert replies == [(2, b"\x01" + text("x"))]
             caller.close()
             await ros.ask("destroy", thing=theirs)
+
+    asyncio.run(main())
+
+
+def test_calls_of_those_who_have_hung_up_are_not_made(master: Master) -> None:
+    async def main() -> None:
+        async with board(master) as node:
+            served: Any = node.server("~set", *HALVES, nothing)
+            found: list[str] = []
+            while not found:
+                found = [uri for uri in [await node.node.lookup("/serial_node/set")] if uri]
+            whole = service_converter("std_srvs/SetBool").md5
+            caller = ServiceClient("/impatient", ServiceType("/serial_node/set", "std_srvs/SetBool", whole))
+            call = asyncio.create_task(caller.call(found[0], b"\x01"))
+            await until(lambda: served._waiting)
+            call.cancel()
+            await until(lambda: not served._server.waiting)
+            assert served.take() is None
 
     asyncio.run(main())
 

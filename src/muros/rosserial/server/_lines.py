@@ -16,7 +16,10 @@ __all__ = ["BAUD", "BAUDS", "TCP_PORT", "RawFraming", "identify", "serial_line",
 
 BAUD = 57600
 """Bits per second that rosserial firmware has by default."""
-BAUDS = (57600, 115200, 230400, 1000000, 500000, 921600, 38400, 19200, 9600, 460800, 2000000)
+BAUDS = (
+    *(57600, 115200, 230400, 1000000, 500000, 921600, 38400, 19200, 9600, 460800),
+    *(2000000, 1500000, 3000000, 4000000),
+)
 """The rates that are tried one after the other where none is given: the usual ones first."""
 TCP_PORT = 11411
 """Where boards with a network dial in."""

@@ -484,6 +484,8 @@ class _Server(_Shaped):
             raise RefusedError(str(error), "Let the board have one server for each service") from None
 
     def take(self) -> tuple[Any, bytes] | None:
+        while self._waiting and self._waiting[0] not in self._server.waiting:
+            self._waiting.popleft()  # who asked has hung up meanwhile
         if not self._waiting:
             return None
         request = self._waiting.popleft()
