@@ -25,7 +25,7 @@ from muros.rosserial.server import (
     BoardReset,
     EndpointSetUp,
 )
-from muros.space import Qos, Reliability
+from muros.space import Durability, Qos, Reliability
 from tests.rosserial.scene import START, RosLib, Scene, string
 
 STRING = "std_msgs/msg/String"
@@ -933,6 +933,29 @@ def test_another_board_at_a_port_gets_nothing_on_the_ids_of_the_one_before() -> 
     scene.step(1_000)
     assert board.connected
     assert not board.taken(led) + board.taken(requests)
+
+
+def test_what_was_published_while_a_board_was_away_is_not_carried_out_when_it_starts() -> None:
+    scene = Scene()
+    board = RosLib(scene)
+    drive = board.subscriber("cmd_vel", "std_msgs/Byte")
+    latched = board.subscriber("tf_static", "std_msgs/Byte")
+    write = scene.writer("/cmd_vel", BYTE)
+    keep = scene.writer("/tf_static", BYTE, Qos(Reliability.RELIABLE, Durability.TRANSIENT_LOCAL, depth=1))
+    board.plug()
+    scene.step(1_000)
+    board.pull()
+    for speed in range(20):
+        write(data=speed)
+        scene.step(10)
+    keep(data=7)
+    board.boot()
+    board.plug()
+    scene.step(1_000)
+    write(data=99)
+    scene.step(5)
+    assert board.taken(drive) == [bytes([99])]
+    assert board.taken(latched) == [bytes([7])]
 
 
 def test_parameters_and_logs_before_the_board_was_asked() -> None:

@@ -68,6 +68,9 @@ class Subscriber(Shape, Protocol):
     def take(self) -> bytes | None:
         """The oldest message, None if there is none. Raises BodyError for one that cannot be converted."""
 
+    def forget(self) -> None:
+        """Drops what waits, but what a subscriber that comes new would be given."""
+
     def close(self) -> None:
         """Takes it out of the world."""
 

@@ -153,8 +153,10 @@ class Subscription(Endpoint):
                 return frame(info.topic_id, body, self.board.version)
 
     def restart(self) -> None:
-        """What waited is for whom the board was."""
+        """What waited was for whom the board was: a robot that starts must not carry out old commands."""
         self._waiting.clear()
+        if self.subscriber is not None:
+            self.subscriber.forget()
 
     def resume(self) -> None:
         """What has waited in the world may go."""

@@ -386,6 +386,10 @@ class _Subscriber(_Shaped):
     def take(self) -> bytes | None:
         return self._down(self._waiting.popleft()) if self._waiting else None
 
+    def forget(self) -> None:
+        while len(self._waiting) > 1:  # the newest may be a latched one
+            self._waiting.popleft()
+
     def close(self) -> None:
         self._node.remove(self._subscription)
 

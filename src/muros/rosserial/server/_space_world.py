@@ -338,6 +338,11 @@ class _Subscriber(_Converted):
         except CdrError as error:
             raise BodyError(str(error)) from None
 
+    def forget(self) -> None:
+        if self._qos.durability is Durability.VOLATILE:
+            while self.reader.take() is not None:
+                pass
+
     def relax(self, offered: Qos) -> None:
         """Asks for no more than a writer offers; does nothing once it is closed."""
         if self not in self._node.subscribers:

@@ -192,6 +192,10 @@ class _Subscribers(_Shapes):
                 return body
         return None
 
+    def forget(self) -> None:
+        for part in self._parts:
+            part.forget()
+
     def close(self) -> None:
         for part in self._parts:
             part.close()
