@@ -111,7 +111,9 @@ _OPEN = 3_000
 _BOOT = 2_000
 """Silence until other rates are tried: boards may start when their port is opened, in ms."""
 _PACE_OF = 8
-"""So many messages make the average, and so many are missed until it counts as silent."""
+"""So many messages make the average of a board's pace."""
+_MISSED = 3
+"""So many are missed until it counts as silent."""
 _PAUSE = 1_000
 """A shorter pause means nothing, in ms."""
 _CHECK_AFTER = 700
@@ -348,7 +350,7 @@ class Board:
         silent = self.core.limits.silent
         if self.version != VERSION_GROOVY:
             return silent
-        return min(silent, max(_PAUSE, int(_PACE_OF * self._pace)))
+        return min(silent, max(_PAUSE, int(_MISSED * self._pace)))
 
     def _step(self, what: str) -> None:
         self.state = TRANSITIONS.get((self.state, what), self.state)
