@@ -2,12 +2,14 @@
 
 import asyncio
 import threading
+from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from muros.rclc import Context, Executor, GuardCondition, RclError, Threads
-from muros.rclc.host.sharing import Bell, Ended, Mailbox, Seat, share
+from muros.rclc.host.sharing import Bell, Ended, Mailbox, Seat, call_elsewhere, share
 
 from std_msgs.msg import Int32
 
@@ -181,3 +183,22 @@ def test_a_middleware_that_cannot_be_shared_is_said() -> None:
         threads.executor("own").add(subscription)
     context.handles.clear()
     context.close()
+
+
+def test_a_call_whose_room_another_has_taken_begins_again() -> None:
+    rooms = [True, False, True, True]
+    begun: list[int] = []
+    sharing = SimpleNamespace(
+        wake=lambda: None,
+        spin_once=lambda: None,
+        wait=lambda left: None,
+        call_in=lambda handle: lambda function: function(),
+    )
+    handle = SimpleNamespace(context=SimpleNamespace(sharing=sharing, running=True))
+
+    def begin(done: Callable[[], object]) -> None:
+        begun.append(len(rooms))
+        done()
+
+    call_elsewhere(handle, lambda: rooms.pop(0), begin, timeout=60.0)
+    assert begun == [0]

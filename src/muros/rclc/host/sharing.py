@@ -539,25 +539,33 @@ def call_elsewhere(
 ) -> None:
     """Waits for what another thread does for a handle of its own, at most ``timeout`` seconds.
 
-    That thread calls ``begin(done)`` as soon as there is ``room()``, and ``done()`` when it has come about.
+    That thread calls ``begin(done)`` as soon as there is ``room()``, and ``done()`` when it has come about. Of several
+    calls that saw the same room the others wait for more.
     """
     sharing: Sharing = handle.context.sharing
-    over = False
+    over = begun = False
 
     def done() -> None:
         nonlocal over
         over = True
         sharing.wake()
 
+    def start() -> None:
+        nonlocal begun
+        if room():
+            begin(done)
+        else:
+            begun = False
+            sharing.wake()
+
     end = time.monotonic() + timeout
-    begun = False
     while not over:
         left = 1000 * (end - time.monotonic())
         if left <= 0 or not handle.context.running:
             return
         if not begun and room():
             begun = True
-            (hand_over(handle) or _at_once)(lambda: begin(done))
+            (hand_over(handle) or _at_once)(start)
         sharing.spin_once()
         if not over:
             sharing.wait(int(left if begun else min(left, _NAP)) + 1)
