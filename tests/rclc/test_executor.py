@@ -1,18 +1,21 @@
 """The executor: what it runs, when, and what it refuses. Cases are named as in the C library, in virtual time."""
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
+from muros.client import Udp
 from muros.rclc import (
     ALWAYS,
     GO_ON,
     LET,
     RCLCPP,
+    CallbackGroup,
     CapacityError,
     Context,
     Executor,
@@ -742,6 +745,47 @@ def test_h1_to_h5_handles(local: InSpace) -> None:
     assert subscription.entity is not None
     executor.remove(subscription)
     assert executor.handles == []
+
+
+def test_x6_removing_what_is_not_there(local: InSpace) -> None:
+    executor = local.executor()
+    timer = local.context.node("n").timer(1.0, print)
+    executor.add(local.context.node("n").timer(2.0, print))
+    with pytest.raises(HandleError) as absent:
+        executor.remove(timer)
+    assert str(absent.value) == "print, the callback of the timer of 1000 ms, is not in this executor"
+    assert absent.value.code == 1
+    with pytest.raises(TypeError, match="an executor cannot run None: add subscriptions") as none:
+        executor.remove(None)
+    assert getattr(none.value, "code", None) == 11
+
+
+MISUSED: list[tuple[Callable[[Context], object], type[Exception], str]] = [
+    (lambda c: c.node("n").timer(1.0, print).exchange_period(-1), ValueError, "period of a timer is -1: it"),
+    (lambda c: c.node("n").timer(1.0, print).exchange_period(math.nan), ValueError, "timer is nan: it"),
+    (lambda c: c.node("n").timer(1.0, print).exchange_period(cast(Any, "x")), ValueError, "timer is 'x': it"),
+    (lambda c: GuardCondition(c, FIVE), TypeError, "the callback of a guard condition is a function, not 5"),
+    (lambda c: GuardCondition(FIVE, print), TypeError, "GuardCondition needs a context, not 5"),
+    (lambda c: Executor(c).spin_some(cast(Any, "x")), ValueError, "timeout is 'x': it must be a number of"),
+    (lambda c: Executor(c).spin_until(bool, math.nan), ValueError, "timeout is nan: it must be a number"),
+    (lambda c: CallbackGroup(FIVE), TypeError, "the name of a group is a str, not 5"),
+    (lambda c: CallbackGroup("g").add(None), TypeError, "a group cannot run None: add subscriptions"),
+    (
+        lambda c: Context(Udp("127.0.0.1", 9), client_key=0),
+        ValueError,
+        "client_key is 0x0: it must be from 1",
+    ),
+]
+
+
+@pytest.mark.parametrize(("use", "kind", "said"), MISUSED, ids=[case[2] for case in MISUSED])
+def test_wrong_use_has_the_code_of_the_c_library(
+    local: InSpace, use: Callable[[Context], object], kind: type[Exception], said: str
+) -> None:
+    with pytest.raises(kind) as caught:
+        use(local.context)
+    assert said in str(caught.value)
+    assert getattr(caught.value, "code", None) == 11
 
 
 def test_errors_bear_the_codes_of_the_c_library() -> None:

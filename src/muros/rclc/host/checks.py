@@ -5,6 +5,7 @@ Errors are TypeErrors and ValueErrors whose ``code`` is the return code of the C
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from muros.client.qos import Qos, profile
@@ -38,6 +39,22 @@ def be_callable(callback: Any, what: str) -> None:
     """Raises WrongTypeError unless it can be called."""
     if not callable(callback):
         raise WrongTypeError(f"{what} is a function, not {callback!r}")
+
+
+def be_period(period: Any) -> None:
+    """Raises WrongValueError unless it is a period that a timer can have, in seconds."""
+    if not isinstance(period, int | float) or not math.isfinite(period) or period < 0:
+        raise WrongValueError(
+            f"the period of a timer is {period!r}: it must be a number of seconds, at least 0"
+        )
+
+
+def be_handle(handle: Any, who: str = "an executor") -> None:
+    """Raises WrongTypeError unless it is something that executors run."""
+    if isinstance(handle, type) or not (hasattr(handle, "ready") and hasattr(handle, "run")):
+        raise WrongTypeError(
+            f"{who} cannot run {handle!r}: add subscriptions, timers, services, clients, guard conditions"
+        )
 
 
 def be_message(kind: Any) -> None:

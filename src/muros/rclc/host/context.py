@@ -5,7 +5,6 @@ Errors are TypeErrors and ValueErrors whose ``code`` is the return code of the C
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
@@ -22,6 +21,7 @@ from muros.rclc.errors import InvalidNameError, RclError
 from muros.rclc.host import logger as host_logger
 from muros.rclc.host import remapping
 from muros.rclc.host.checks import (
+    INVALID_ARGUMENT,
     NODE_INVALID_NAMESPACE,
     SERVICE_NAME_INVALID,
     TOPIC_NAME_INVALID,
@@ -29,6 +29,7 @@ from muros.rclc.host.checks import (
     WrongValueError,
     be_callable,
     be_message,
+    be_period,
     be_qos,
     be_service,
     be_text,
@@ -106,7 +107,11 @@ class Context(context_.Context):
         ):
             raise WrongTypeError(f"Context needs a transport such as Udp('192.168.1.10', 8888), not {way!r}")
         if hasattr(way, "receive") and not hasattr(way, "participant"):
-            way = Session(way, client_key, **options)
+            try:
+                way = Session(way, client_key, **options)
+            except (TypeError, ValueError) as error:
+                error.code = INVALID_ARGUMENT  # type: ignore[union-attr]  # rooms below know no return codes
+                raise
         elif client_key is not None or options:
             name = next(iter(options), "client_key")
             raise WrongTypeError(f"{name} belongs to the session: Context(Session(transport, {name}=...))")
@@ -220,10 +225,7 @@ class Node(context_.Node):
 
     def timer(self, period: float, callback: Callable[[], object], autostart: bool = True) -> Timer:
         """A timer; an executor calls ``callback()`` every ``period`` seconds."""
-        if not isinstance(period, int | float) or not math.isfinite(period) or period < 0:
-            raise WrongValueError(
-                f"the period of a timer is {period!r}: it must be a number of seconds, at least 0"
-            )
+        be_period(period)
         be_callable(callback, "the callback of a timer")
         made = Timer(self.context, period, callback, autostart)
         made.home = self.entities

@@ -20,9 +20,10 @@ from muros.client.session import Session
 from muros.rclc import context as context_
 from muros.rclc import executor as executor_
 from muros.rclc import handles
+from muros.rclc.errors import RclError
 from muros.rclc.handle_error import HandleError
 from muros.rclc.host.awaiting import Sleeper, pause
-from muros.rclc.host.checks import WrongTypeError, WrongValueError, be_callable
+from muros.rclc.host.checks import WrongTypeError, WrongValueError, be_callable, be_handle
 from muros.rclc.host.handles import describe, tell_problem, ticks
 from muros.rclc.host.let import HostLet, HostTask
 from muros.rclc.overruns import GO_ON, LOW_PRIORITY
@@ -118,10 +119,7 @@ class Executor(executor_.Executor):
         Raises CapacityError when the executor is full, HandleError for a handle of another context and for one that is
         here already, TypeError for anything else.
         """
-        if isinstance(handle, type) or not (hasattr(handle, "ready") and hasattr(handle, "run")):
-            raise WrongTypeError(
-                f"an executor cannot run {handle!r}: add subscriptions, timers, services, clients, guard conditions"
-            )
+        be_handle(handle)
         if callback is not None:
             be_callable(callback, "the callback of a handle")
         if when not in (ON_NEW_DATA, ALWAYS):
@@ -164,7 +162,15 @@ class Executor(executor_.Executor):
                 self.add(handle)
 
     def remove(self, handle: Any) -> None:
-        """Runs a handle no more; the others keep their order. Raises HandleError when it is not here."""
+        """Runs a handle no more; the others keep their order.
+
+        Raises HandleError (``code`` 1) when it is not here, TypeError for what is no handle.
+        """
+        be_handle(handle)
+        if handle not in self.handles:
+            error = HandleError(f"{describe(handle)}, is not in this executor")
+            error.code = RclError.code
+            raise error
         handles.remove(self, handle)
         if handle in self.always:
             self.always.remove(handle)
@@ -195,8 +201,9 @@ class Executor(executor_.Executor):
 
         At most ``timeout`` seconds, None: as long as it takes.
         """
-        if timeout is None or timeout > 0:
-            return self._drive(self._round(_patience(timeout)))
+        patience = _patience(timeout)
+        if patience > 0:
+            return self._drive(self._round(patience))
         ran = self.work(self.context.clock(), True)
         self.stopped = False
         return ran
@@ -450,7 +457,11 @@ def _milliseconds(seconds: Any, name: str = "period") -> float:
 
 
 def _patience(seconds: float | None) -> float:
-    return math.inf if seconds is None else seconds * 1000
+    if seconds is None:
+        return math.inf
+    if not isinstance(seconds, int | float) or math.isnan(seconds):
+        raise WrongValueError(f"timeout is {seconds!r}: it must be a number of seconds, or None for no limit")
+    return seconds * 1000
 
 
 def _be_count(count: Any, least: int, name: str, what: str) -> None:

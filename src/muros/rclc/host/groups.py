@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any, Final
 from muros.rclc import scheduling
 from muros.rclc.context import Context as AnyContext
 from muros.rclc.errors import RclError
-from muros.rclc.host.checks import WrongTypeError
+from muros.rclc.host.checks import WrongTypeError, be_handle, be_text
 from muros.rclc.host.executor import Executor
 from muros.rclc.host.handles import describe, tell_problem
 from muros.rclc.host.sharing import Ended, Seat, share
@@ -91,6 +91,7 @@ class CallbackGroup:
     """Handles of one context that belong together: one thread runs them, in the order of adding."""
 
     def __init__(self, name: str, real_time_class: RealTimeClass = BEST_EFFORT) -> None:
+        be_text(name, "the name of a group")
         if not isinstance(real_time_class, RealTimeClass):
             raise WrongTypeError(
                 f"the class of a group is REAL_TIME_CRITICAL, SOFT_REAL_TIME or BEST_EFFORT, not {real_time_class!r}"
@@ -109,8 +110,9 @@ class CallbackGroup:
     def add(self, handle: Any, *arguments: Any, **options: Any) -> Any:
         """Puts a handle into the group and returns it; further arguments are those of ``Executor.add``.
 
-        Raises RclError for a handle that is in a group already.
+        Raises RclError for a handle that is in a group already, TypeError for what is no handle.
         """
+        be_handle(handle, "a group")
         other = vars(handle).get("callback_group") if hasattr(handle, "__dict__") else None
         if other is not None:
             raise RclError(

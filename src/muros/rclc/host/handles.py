@@ -15,6 +15,7 @@ from muros.client.qos import profile
 from muros.rclc import guard as guard_
 from muros.rclc import subscription as subscription_
 from muros.rclc import timer as timer_
+from muros.rclc.host.checks import WrongTypeError, be_callable, be_period
 
 if TYPE_CHECKING:
     from muros.client.qos import Qos
@@ -110,7 +111,8 @@ class Timer(timer_.Timer):
         self._next = self._last + self.period
 
     def exchange_period(self, period: float) -> float:
-        """Sets the period in seconds, used from the next call on; returns the old one."""
+        """Sets the period in seconds, used from the next call on; returns the old one. ValueError for what is none."""
+        be_period(period)
         old = self.period / 1000
         self.period = period * 1000  # type: ignore[assignment]  # boards count whole ones
         return old
@@ -118,6 +120,12 @@ class Timer(timer_.Timer):
 
 class GuardCondition(guard_.GuardCondition):
     """See ``muros.rclc.guard.GuardCondition``."""
+
+    def __init__(self, context: Context, callback: Callable[[], object]) -> None:
+        if not hasattr(context, "handles"):
+            raise WrongTypeError(f"GuardCondition needs a context, not {context!r}")
+        be_callable(callback, "the callback of a guard condition")
+        super().__init__(context, callback)
 
     def trigger(self) -> None:
         """Makes it ready, from any thread.

@@ -39,6 +39,8 @@ _PREFIX = re.compile(rf"({_TOKEN}):(?!=|//)(.*)\Z", re.DOTALL)
 class ArgumentsError(ValueError):
     """Arguments that cannot be meant; ``code`` is that of the C library for the kind of argument."""
 
+    code = INVALID_ROS_ARGS
+
     def __init__(self, said: str, code: int = INVALID_ROS_ARGS) -> None:
         super().__init__(said)
         self.code = code
