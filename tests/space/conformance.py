@@ -14,6 +14,7 @@ from muros.space import (
     CDR_BE,
     CDR_LE,
     Appeared,
+    Assigned,
     ClosedError,
     Durability,
     Endpoint,
@@ -1049,7 +1050,7 @@ class SpaceConformance:
         def names() -> list[tuple[str, bytes]]:
             shown = []
             for event in events:
-                if isinstance(event, Appeared | Vanished):
+                if isinstance(event, Appeared | Vanished | Assigned):
                     shown.append((type(event).__name__, event.what.gid))
                 else:
                     assert event.writer.gid == writer.gid

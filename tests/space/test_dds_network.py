@@ -10,6 +10,7 @@ from muros.rtps import EndpointQos, ParticipantLost, Why, inline_qos
 from muros.rtps._wire import AckNack, parse_untrusted
 from muros.space import (
     Appeared,
+    Assigned,
     Durability,
     ParticipantInfo,
     Qos,
@@ -641,6 +642,23 @@ class TestGraph:
             "node0",
             "node1",
         ]
+
+    def test_whose_an_endpoint_is_may_be_told_later_than_the_endpoint(self) -> None:
+        net = Net()
+        one, two = net.computer(), net.computer()
+        talker = one.space.participant("talker")
+        two.space.participant("onlooker")
+        net.until(lambda: any(node.name == "talker" for node in two.graph.nodes))
+        watched: list[Any] = []
+        two.graph.watch(watched.append)
+        writer = talker.writer(CHATTER, RELIABLE)
+        net.until(lambda: any(isinstance(event, Assigned) for event in watched))
+        assert [(type(event), event.what.gid, event.what.participant.name) for event in watched] == [
+            (Appeared, writer.gid, ""),
+            (Assigned, writer.gid, "talker"),
+        ]
+        net.run(5 * SECOND)
+        assert len(watched) == 2, "said again, it is no news"
 
     def test_the_books_pass_to_the_next_when_the_first_goes(self) -> None:
         net = Net()

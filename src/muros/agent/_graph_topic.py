@@ -77,8 +77,11 @@ class _Domain:
 
     def _changed(self, event: GraphEvent) -> None:
         if self._call is None:
-            delay = DELAY + len(self._said) // PACE
-            self._call = self._core.call_at(self._core.now + delay, self._publish)
+            self._gather()
+
+    def _gather(self) -> None:
+        delay = DELAY + len(self._said) // PACE
+        self._call = self._core.call_at(self._core.now + delay, self._publish)
 
     def _publish(self) -> None:
         self._call = None
@@ -87,8 +90,12 @@ class _Domain:
             self.close()
             return
         graph = self._graph()
-        if graph != self._said and self._writer.write(graph):
+        if graph == self._said:
+            return
+        if self._writer.write(graph):
             self._said = graph
+        else:
+            self._gather()  # a reader has no room: try again
 
     def _graph(self) -> bytes:
         """The graph as it is now, serialised."""

@@ -24,6 +24,7 @@ from muros.space._door import (
 )
 from muros.space._graph import (
     Appeared,
+    Assigned,
     Endpoint,
     Graph,
     GraphEvent,
@@ -65,6 +66,7 @@ __all__ = [
     "CDR_LE",
     "PRESETS",
     "Appeared",
+    "Assigned",
     "ClosedError",
     "Durability",
     "Endpoint",

@@ -116,7 +116,14 @@ class Vanished:
     what: ParticipantInfo | Endpoint
 
 
-GraphEvent = Appeared | Vanished | Matched | Unmatched | Incompatible
+@dataclass(frozen=True, slots=True)
+class Assigned:
+    """An endpoint of another process belongs to another node than was known so far: that is told on its own."""
+
+    what: Endpoint
+
+
+GraphEvent = Appeared | Vanished | Assigned | Matched | Unmatched | Incompatible
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,7 @@ from muros.space._core import Core
 from muros.space._door import SpaceError
 from muros.space._graph import (
     Appeared,
+    Assigned,
     Endpoint,
     Incompatible,
     Matched,
@@ -518,10 +519,16 @@ class CycloneDomain:
                 remote = self.remotes[prefix] = Remote(told.participant, self.number)
             before = remote.infos
             remote.set_nodes(told.nodes)
+            moved = []
             for gid, endpoint in remote.endpoints.items():
-                remote.endpoints[gid] = replace(endpoint, participant=remote.info_of(gid))
+                if endpoint.participant != (info := remote.info_of(gid)):
+                    moved.append(replace(endpoint, participant=info))
+            remote.endpoints.update((endpoint.gid, endpoint) for endpoint in moved)
             self._tell_all(Vanished, tuple(info for info in before if info not in remote.infos))
             self._tell_all(Appeared, tuple(info for info in remote.infos if info not in before))
+            if self.core.watchers:
+                for endpoint in moved:
+                    self.core.tell(Assigned(endpoint))
 
     def _unreadable(self, why: str) -> None:
         self.core.report(

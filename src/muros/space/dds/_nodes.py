@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from muros._distros import OLD_DISTROS
 from muros.rtps import LocalReader, ReaderSettings, Received, WriterSettings
-from muros.space._graph import Appeared, Vanished
+from muros.space._graph import Appeared, Assigned, Vanished
 from muros.space._participant import READER_KIND, WRITER_KIND
 from muros.space._timers import Timer
 from muros.space._values import GID_SIZE
@@ -142,10 +142,13 @@ class Nodes:
             )
             return True
         before = remote.infos
-        remote.set_nodes(info.nodes)
+        moved = remote.set_nodes(info.nodes)
         after = remote.infos
         home.tell_all(Vanished, tuple(each for each in before if each not in after))
         home.tell_all(Appeared, tuple(each for each in after if each not in before))
+        if home.core.watchers:
+            for endpoint in moved:
+                home.core.tell(Assigned(home.shown(endpoint)))
         if info.nodes:
             self._adapt(size)
         home.core.settle()

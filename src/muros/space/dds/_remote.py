@@ -65,11 +65,11 @@ class Remote:
         """The node that has an endpoint; itself when none says so."""
         return self._node_of.get(gid, self.bare)
 
-    def set_nodes(self, nodes: tuple[NodeEntities, ...]) -> None:
-        """These are its nodes now."""
+    def set_nodes(self, nodes: tuple[NodeEntities, ...]) -> list[EndpointData]:
+        """These are its nodes now. Returns the endpoints known that belong to another node than before."""
         bare = self.bare
         infos = []
-        self._node_of = {}
+        before, self._node_of = self._node_of, {}
         for node in nodes:
             info = ParticipantInfo(
                 bare.gid, node.name, node.namespace, self.domain, bare.enclave,
@@ -79,6 +79,7 @@ class Remote:
             for gid in (*node.readers, *node.writers):
                 self._node_of[gid] = info
         self._nodes = tuple(infos)
+        return [data for gid, data in self.endpoints.items() if before.get(gid) != self._node_of.get(gid)]
 
 
 def _first(properties: dict[str, str], names: tuple[str, ...]) -> str:
