@@ -431,8 +431,9 @@ class Board:
             )
             if not self.roster.endpoints:
                 self.suspicions.no_topics()
-        if self.roster.lacks():
-            if now >= self._asked_at + self.core.limits.ask:
+        due = now >= self._asked_at + self.core.limits.ask
+        if self.roster.lacks(tell=due):
+            if due:
                 self._ask(now)
             self._settle_at = self._asked_at + self.core.limits.ask
 

@@ -72,8 +72,8 @@ class Roster:
         """What was not named after the last topic request."""
         return [each for each in self.endpoints.values() if each.round != self.board.round]
 
-    def lacks(self) -> bool:
-        """Whether the board has not named all of ``~require/publishers`` and ``~require/subscribers``.
+    def lacks(self, tell: bool) -> bool:
+        """Whether the board has not named all of ``~require/publishers`` and ``~require/subscribers``; says which.
 
         A TopicInfo that got lost may be seen by nothing else.
         """
@@ -83,8 +83,10 @@ class Roster:
             wanted = None if board.node is None else board.node.parameter(f"~require/{kind.kind}s")
             there = {self._full(each.name) for each in self.endpoints.values() if isinstance(each, kind)}
             for name in wanted if isinstance(wanted, list | tuple) else ():
-                if self._full(str(name)) not in there:
-                    lacks = True
+                if self._full(str(name)) in there:
+                    continue
+                lacks = True
+                if tell:
                     board.report(
                         "required-topic-missing",
                         subject=f"{kind.kind} {name}",
