@@ -134,6 +134,15 @@ def test_closing() -> None:
     assert board.session.state == WAITING
 
 
+def test_nothing_is_acknowledged_behind_the_goodbye() -> None:
+    board = Board()
+    board.agent.inbox.append(board.agent.data(_READER, bytes(4)))
+    said = board.agent.said
+    board.session.close()
+    assert board.agent.said == said + 1, "it would come to an agent that does not know the session any more"
+    assert board.heard == 0
+
+
 def test_ping_without_a_session() -> None:
     assert not ask(Custom(lambda: True, lambda: None, lambda buf, off, n: None, lambda buf: 0), 1, 5)
 

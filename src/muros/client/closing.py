@@ -28,6 +28,11 @@ def leave(session: "Session") -> None:
 
 def close(session: "Session") -> None:
     """Deletes the session at the agent, in at most ten attempts of 100 ms, and closes the transport for good."""
+
+    def deliver(buf: "Buffer", off: int, n: int) -> None:
+        if n > 1 and not buf[off + 1]:  # of no stream: the agent knows no session to acknowledge in
+            session.deliver(buf, off, n)
+
     transport = session.transport
     left = session.notes.get("destroy_timeout", _ATTEMPTS * _PATIENCE)  # hosts may set it
     try:
@@ -35,7 +40,7 @@ def close(session: "Session") -> None:
             leave(session)
             if left > 0:
                 transport.wait(min(_PATIENCE, left))
-                transport.receive(session.deliver)
+                transport.receive(deliver)
             left -= _PATIENCE
             if left <= 0:
                 break
