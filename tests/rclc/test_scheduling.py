@@ -12,6 +12,7 @@ import pytest
 
 from muros.rclc import REAL_TIME_CRITICAL, SOFT_REAL_TIME, CallbackGroup, Context, Threads
 from muros.rclc import scheduling as s
+from muros.space import open_space
 
 linux = pytest.mark.skipif(not hasattr(os, "sched_setscheduler"), reason="only Linux schedules so")
 
@@ -161,6 +162,27 @@ def test_refusals_are_one_problem_and_the_threads_run(monkeypatch: pytest.Monkey
     assert "'critical', 'soft': SCHED_FIFO 49 is not permitted" in text
     assert text.count("CAP_SYS_NICE") == 1
     assert text.endswith("They go on with what they have.")
+
+
+def test_on_a_space_a_refusal_is_a_finding_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_setscheduler", refusing(errno.EPERM), raising=False)
+    space = open_space("local:")
+    context = Context(space)
+    problems: list[int] = []
+    context.on_problem(lambda code, text: problems.append(code))
+    group = CallbackGroup("control", REAL_TIME_CRITICAL)
+    ran = threading.Event()
+    group.add(context.node("node").timer(0.001, ran.set))
+    threads = Threads(context)
+    threads.assign(group)
+    with threads:
+        assert ran.wait(20)
+    context.close()
+    found = [finding for finding in space.findings.snapshot() if finding.code == "thread-not-scheduled"]
+    space.close()
+    assert [finding.who for finding in found] == ["the threads of this program"]
+    assert "SCHED_FIFO 49 is not permitted" in found[0].why
+    assert problems.count(52) == 1
 
 
 UNPRIVILEGED = """

@@ -485,6 +485,9 @@ class Threads:
                 NOT_SCHEDULED,
                 f"threads run, but not all are scheduled as they should be. {why} They go on with what they have.",
             )
+            find = getattr(self.context.middleware, "not_scheduled", None)
+            if find is not None:  # straight on a space, which has findings
+                find("the threads of this program", why)
 
 
 class _Hurry:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from muros.findings import Finding
 from muros.space._door import Space
+from muros.space.rclc._problems import NOT_SCHEDULED
 from muros.space.rclc._serving import Server
 
 if TYPE_CHECKING:
@@ -65,6 +66,8 @@ class Ground:
 
     def _tell(self, finding: Finding) -> None:
         """Give a finding to the contexts whose node it is about; what is about nobody, to those who listen."""
+        if finding.code == NOT_SCHEDULED:
+            return
         hearing = [context for context in self.contexts if finding.who in context.owners]
         if not hearing and self.owned:
             hearing = [context for context in self.contexts if context.on_problem is not None]

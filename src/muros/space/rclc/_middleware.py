@@ -28,7 +28,7 @@ from muros.space.rclc._entities import (
 )
 from muros.space.rclc._events import SpaceEvents
 from muros.space.rclc._graph import SpaceGraph
-from muros.space.rclc._problems import NOT_SPUN, code_of, line_of
+from muros.space.rclc._problems import NOT_SCHEDULED, NOT_SPUN, code_of, line_of
 
 if TYPE_CHECKING:
     from muros.client._types import OnData
@@ -201,6 +201,18 @@ class SpaceMiddleware:
     def ping(self, timeout: int, clock: Callable[[], int], /) -> bool:
         """Whether we are in the graph: there is nobody else to ask."""
         return not self.closed
+
+    def not_scheduled(self, who: str, why: str) -> None:
+        """A finding: the system does not schedule some threads of this program as they should be."""
+        with self._server.lock:
+            self.ground.space.findings.report(
+                NOT_SCHEDULED,
+                who=who,
+                what="threads run, but not all are scheduled as they should be",
+                why=why,
+                remedy="Give the program the capability or limit that is named, or threads a policy that needs none",
+                now=time.time(),
+            )
 
     def wake(self) -> None:
         """Ends a wait; from any thread."""

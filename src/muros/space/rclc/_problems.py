@@ -9,7 +9,7 @@ from typing import Final
 
 from muros.findings import Finding
 
-__all__ = ["ENCODING", "NETWORK", "NOT_SPUN", "OTHER", "PROBLEMS", "code_of", "line_of"]
+__all__ = ["ENCODING", "NETWORK", "NOT_SCHEDULED", "NOT_SPUN", "OTHER", "PROBLEMS", "code_of", "line_of"]
 
 NOT_SPUN: Final = 18
 """A context is published in, but nobody spins it."""
@@ -19,6 +19,9 @@ ENCODING: Final = 19
 
 OTHER: Final = 20
 """The space reports something that has no number of its own."""
+
+NOT_SCHEDULED: Final = "thread-not-scheduled"
+"""The finding that a thread is not scheduled as it should be. rclc has told its context of it already."""
 
 NETWORK: Final = 40
 """The network, or somebody on it, is not as it should be; these findings have codes that begin with ``dds-``."""
