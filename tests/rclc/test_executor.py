@@ -626,6 +626,27 @@ def test_an_error_is_raised_and_says_whose_it_is(bench: Bench) -> None:
     assert executor.errors == 2
 
 
+@pytest.mark.parametrize("semantics", [RCLCPP, LET])
+def test_a_trigger_that_raises_is_an_error_like_others(bench: Bench, semantics: int) -> None:
+    topics = Topics(bench, 1)
+    told: list[tuple[int, str]] = []
+    bench.context.on_problem(lambda code, text: told.append((code, text)))
+    raises = bench.executor(trigger=broken, semantics=semantics)
+    raises.add(topics.subscriptions[0])
+    topics.say((0, 1))
+    with pytest.raises(ZeroDivisionError) as caught:
+        raises.spin_some(0.1)
+    assert caught.value.__notes__[0].startswith("raised by the trigger")
+    goes_on = bench.executor(trigger=broken, semantics=semantics, on_error=GO_ON)
+    goes_on.add(topics.subscriptions[0])
+    assert not goes_on.spin_some(0.1)
+    assert goes_on.errors
+    assert told[0][1].startswith("the trigger")
+    goes_on.trigger = None
+    goes_on.spin_some(0.1)
+    assert topics.got == [(0, 1)]
+
+
 def test_an_executor_may_go_on_and_tell(bench: Bench) -> None:
     topics = Topics(bench, 2)
     told: list[tuple[int, str]] = []

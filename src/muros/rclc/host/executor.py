@@ -286,7 +286,7 @@ class Executor(executor_.Executor):
         if self.always:
             if not self._wanted(now, late):
                 return False
-        elif trigger is not None and not trigger(self.handles):
+        elif trigger is not None and not self._triggered(trigger):
             return False
         ran = False
         always = self.always
@@ -300,10 +300,10 @@ class Executor(executor_.Executor):
                         raise
         return ran
 
-    def survives(self, handle: Any, error: Exception) -> bool:
-        """Whether the executor goes on although a callback of a handle has raised; says whose it was."""
+    def survives(self, handle: Any, error: Exception, where: str = "") -> bool:
+        """Whether the executor goes on although a callback of a handle has raised; says whose it was, or ``where``."""
         self.errors += 1
-        where = "" if handle is None else describe(handle)
+        where = where if handle is None else describe(handle)
         if where:
             error.add_note(f"raised by {where}")
         if self.on_error is None:
@@ -321,7 +321,16 @@ class Executor(executor_.Executor):
         news = any(handle.ready(now) for handle in self.handles)
         if self.trigger is None:
             return news
-        return (news or late) and self.trigger(self.handles)
+        return (news or late) and self._triggered(self.trigger)
+
+    def _triggered(self, trigger: Trigger) -> bool:
+        """What a trigger says; no when it raises and the executor goes on."""
+        try:
+            return trigger(self.handles)
+        except Exception as error:
+            if not self.survives(None, error, "the trigger"):
+                raise
+            return False
 
     # Ways of spinning
 

@@ -98,6 +98,15 @@ class HostLet(Let):
         assert isinstance(task, HostTask)
         return task
 
+    def start(self, now: int, timed: bool = True, due: bool = True) -> bool:
+        """Starts a period: reads all inputs. Whether there is anything to call."""
+        try:
+            return super().start(now, timed, due)
+        except Exception as error:
+            if not self.executor.survives(None, error, "the trigger or an input at the start of a period"):
+                raise
+            return False
+
     def begin(self, start: float, period: float) -> None:
         """Starts a period of so many ms at the tick `start`, and calls what is to be called, or has it called."""
         self.period = period  # type: ignore[assignment]
