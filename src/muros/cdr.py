@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 class CdrError(ValueError):
     """A message does not fit its type: received bytes are short or malformed, or a value cannot be written."""
 
+    code = 1  # that of the C library for what cannot be serialised
+
 
 class Fields:
     """A nested message: its fields are the attributes. What type it is only the message around it knows."""

@@ -490,3 +490,13 @@ def test_what_is_destroyed_is_forgotten(stage: Stage) -> None:
     node.destroy()
     assert node.entities == []
     del kept
+
+
+def test_a_value_that_does_not_fit_has_a_return_code_too(stage: Stage) -> None:
+    pair = Pair(stage)
+    publisher = pair.one.publisher(Int32, "value")
+    pair.other.subscription(Int32, "value", print)
+    stage.meet(publisher)
+    with pytest.raises(ValueError, match=r"Int32\.data: 1099511627776 does not fit int32") as caught:
+        publisher.publish(Int32(data=2**40))
+    assert getattr(caught.value, "code", None) == 1
