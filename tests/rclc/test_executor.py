@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
@@ -28,28 +28,12 @@ from muros.rclc import (
     any_of,
     one,
 )
-from tests.rclc.virtual import WAYS, Bench, InSpace
+from tests.rclc.virtual import Bench, InSpace
 
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32, String
 
 FIVE: Any = 5
-
-
-@pytest.fixture(params=WAYS)
-def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    """Two contexts, on each of the ways."""
-    made = WAYS[request.param]()
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def local() -> Iterator[InSpace]:
-    """Two contexts in a space."""
-    made = InSpace()
-    yield made
-    made.close()
 
 
 class Topics:
@@ -94,25 +78,25 @@ REFUSED: list[tuple[Callable[[Context], object], type[Exception], str]] = [
 
 @pytest.mark.parametrize(("use", "kind", "said"), REFUSED, ids=[case[2] for case in REFUSED])
 def test_x1_init_refuses_what_makes_no_sense(
-    local: InSpace, use: Callable[[Context], object], kind: type[Exception], said: str
+    bench: Bench, use: Callable[[Context], object], kind: type[Exception], said: str
 ) -> None:
     with pytest.raises(kind) as caught:
-        use(local.context)
+        use(bench.context)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
     assert getattr(caught.value, "code", None) == 11
 
 
-def test_x1_init(local: InSpace) -> None:
-    executor = local.executor(5, all_of(), semantics=LET, period=0.01, timeout=0.5, on_error=GO_ON)
+def test_x1_init(bench: Bench) -> None:
+    executor = bench.executor(5, all_of(), semantics=LET, period=0.01, timeout=0.5, on_error=GO_ON)
     assert (executor.capacity, executor.handles, executor.errors, executor.overruns) == (5, [], 0, 0)
 
 
-def test_x2_x34_what_has_ended_does_nothing(local: InSpace) -> None:
-    executor = local.executor()
-    local.context.node("node").timer(0.001, lambda: 1 / 0)
-    local.context.close()
-    local.context.close()
+def test_x2_x34_what_has_ended_does_nothing(bench: Bench) -> None:
+    executor = bench.executor()
+    bench.context.node("node").timer(0.001, lambda: 1 / 0)
+    bench.context.close()
+    bench.context.close()
     executor.spin()
     assert not executor.spin_some(0.0)
     assert not executor.spin_until(lambda: False, 1.0)
@@ -128,9 +112,9 @@ ADDED: dict[str, Callable[[Context], Any]] = {
 
 
 @pytest.mark.parametrize("make", ADDED.values(), ids=list(ADDED))
-def test_x3_to_x12_add_and_remove(local: InSpace, make: Callable[[Context], Any]) -> None:
-    executor = local.executor(2)
-    handle = make(local.context)
+def test_x3_to_x12_add_and_remove(bench: Bench, make: Callable[[Context], Any]) -> None:
+    executor = bench.executor(2)
+    handle = make(bench.context)
     executor.add(handle)
     assert executor.handles == [handle]
     with pytest.raises(HandleError, match="was added already: an executor runs each handle once") as caught:
@@ -141,9 +125,9 @@ def test_x3_to_x12_add_and_remove(local: InSpace, make: Callable[[Context], Any]
             executor.add(wrong)
         assert getattr(refused.value, "code", None) == 11
     with pytest.raises(HandleError, match="belongs to another context: an executor runs handles of its own"):
-        executor.add(make(local.talker))
+        executor.add(make(bench.talker))
     with pytest.raises(TypeError, match="the callback of a handle is a function"):
-        executor.add(make(local.open()), FIVE)
+        executor.add(make(bench.open()), FIVE)
     assert executor.handles == [handle], "what is refused leaves nothing behind"
     executor.remove(handle)
     assert executor.handles == []
@@ -152,21 +136,21 @@ def test_x3_to_x12_add_and_remove(local: InSpace, make: Callable[[Context], Any]
     assert (absent.value.code, isinstance(absent.value, RclError)) == (1, True)
 
 
-def test_x5_too_many(local: InSpace) -> None:
-    first, second = (local.context.node("n").timer(1.0, print) for _ in range(2))
-    executor = local.executor(1)
+def test_x5_too_many(bench: Bench) -> None:
+    first, second = (bench.context.node("n").timer(1.0, print) for _ in range(2))
+    executor = bench.executor(1)
     executor.add(first)
     with pytest.raises(
         CapacityError, match=r"executor is full: 1 handles of 1 in use\. Create it with handles=2\."
     ) as e:
         executor.add(second)
     assert (e.value.code, executor.handles) == (1, [first])
-    assert second in local.context.handles, "it is still there for others"
+    assert second in bench.context.handles, "it is still there for others"
 
 
-def test_x6_remove_keeps_the_order_of_the_others(local: InSpace) -> None:
-    one_, two, three = topics = Topics(local, 3).subscriptions
-    executor = local.executor()
+def test_x6_remove_keeps_the_order_of_the_others(bench: Bench) -> None:
+    one_, two, three = topics = Topics(bench, 3).subscriptions
+    executor = bench.executor()
     for subscription in topics:
         executor.add(subscription)
     for taken, left in ((three, [one_, two, three]), (two, [one_, three, two]), (one_, [three, two, one_])):
@@ -237,7 +221,7 @@ def test_x13_spin_timer(bench: Bench) -> None:
     assert {later - before for before, later in pairwise(calls)} <= {99, 100, 101}
 
 
-def test_x14_a_timer_cancels_itself(local: InSpace) -> None:
+def test_x14_a_timer_cancels_itself(bench: Bench) -> None:
     calls: list[int] = []
 
     def call() -> None:
@@ -245,8 +229,8 @@ def test_x14_a_timer_cancels_itself(local: InSpace) -> None:
         if len(calls) == 3:
             timer.cancel()
 
-    timer = local.context.node("n").timer(0.1, call)
-    executor = local.executor()
+    timer = bench.context.node("n").timer(0.1, call)
+    executor = bench.executor()
     for _ in range(100):
         executor.spin_some(0.05)
     assert len(calls) == 3
@@ -335,20 +319,20 @@ def test_x20_what_is_added_between_two_spins(bench: Bench) -> None:
     assert topics.got == [(0, 1), (0, 2), (1, 1)]
 
 
-def test_x21_spin_period_keeps_its_pace_and_catches_up(local: InSpace) -> None:
+def test_x21_spin_period_keeps_its_pace_and_catches_up(bench: Bench) -> None:
     starts: list[int] = []
-    executor = local.executor()
+    executor = bench.executor()
 
     def call(message: object) -> None:
-        starts.append(local.now)
+        starts.append(bench.now)
         if len(starts) == 10:
-            local.take(50)
+            bench.take(50)
         if len(starts) == 100:
             executor.stop()
 
     executor.trigger = always
-    executor.add(Topics(local, 1).subscriptions[0], call, when=ALWAYS)
-    begin = local.now
+    executor.add(Topics(bench, 1).subscriptions[0], call, when=ALWAYS)
+    begin = bench.now
     executor.spin_period(0.02)
     expected = [begin + 20 * i for i in range(100)]
     assert starts[10:12] == [begin + 230, begin + 230], "what is late is caught up without a pause"
@@ -379,31 +363,36 @@ def seen_behind(bench: Bench, semantics: int) -> list[list[int]]:
 
     def forward(message: Any) -> None:
         publisher.publish(Int32(data=2))
+        bench.take(20)
         bench.context.middleware.spin_once()  # as long as it would take until it is there
 
     executor.add(a, forward)
     executor.add(b)
-    talker.publisher(Int32, "a").publish(Int32(data=0))
-    talker.publisher(Int32, "b").publish(Int32(data=1))
+    publishers = [talker.publisher(Int32, name) for name in ("a", "b")]
+    bench.settle()
+    for value, sender in enumerate(publishers):
+        assert sender.publish(Int32(data=value))
+    bench.settle()
     passes = []
     for _ in range(2):
         executor.spin_some()
+        bench.settle()
         passes.append(got.copy())
         got.clear()
     return passes
 
 
-def test_x22_rclcpp_sees_what_was_published_in_the_same_pass(local: InSpace) -> None:
-    assert seen_behind(local, RCLCPP) == [[2], []]
+def test_x22_rclcpp_sees_what_was_published_in_the_same_pass(bench: Bench) -> None:
+    assert seen_behind(bench, RCLCPP) == [[2], []]
 
 
-def test_x23_let_sees_what_was_there_at_the_start(local: InSpace) -> None:
-    assert seen_behind(local, LET) == [[1], [2]]
+def test_x23_let_sees_what_was_there_at_the_start(bench: Bench) -> None:
+    assert seen_behind(bench, LET) == [[1], [2]]
 
 
-def test_x24_trigger_one(local: InSpace) -> None:
-    topics = Topics(local, 2)
-    executor = local.executor(trigger=one(topics.subscriptions[1]))
+def test_x24_trigger_one(bench: Bench) -> None:
+    topics = Topics(bench, 2)
+    executor = bench.executor(trigger=one(topics.subscriptions[1]))
     for subscription in topics.subscriptions:
         executor.add(subscription)
     topics.say((0, 1), (0, 2))
@@ -415,9 +404,9 @@ def test_x24_trigger_one(local: InSpace) -> None:
 
 
 @pytest.mark.parametrize("named", [False, True])
-def test_x25_trigger_any(local: InSpace, named: bool) -> None:
-    topics = Topics(local, 3)
-    executor = local.executor(trigger=any_of(*topics.subscriptions[1:]) if named else any_of())
+def test_x25_trigger_any(bench: Bench, named: bool) -> None:
+    topics = Topics(bench, 3)
+    executor = bench.executor(trigger=any_of(*topics.subscriptions[1:]) if named else any_of())
     for subscription in topics.subscriptions:
         executor.add(subscription)
     topics.say((0, 1))
@@ -427,9 +416,9 @@ def test_x25_trigger_any(local: InSpace, named: bool) -> None:
     assert topics.got == [(0, 1), (2, 1)]
 
 
-def test_x26_trigger_all(local: InSpace) -> None:
-    topics = Topics(local, 2)
-    executor = local.executor(trigger=all_of())
+def test_x26_trigger_all(bench: Bench) -> None:
+    topics = Topics(bench, 2)
+    executor = bench.executor(trigger=all_of())
     for subscription in topics.subscriptions:
         executor.add(subscription)
     topics.say((1, 1))
@@ -439,21 +428,24 @@ def test_x26_trigger_all(local: InSpace) -> None:
     assert topics.got == [(0, 1), (1, 1)]
 
 
-def test_x26_trigger_all_takes_the_newest(local: InSpace) -> None:
+def test_x26_trigger_all_takes_the_newest(bench: Bench) -> None:
     """The trigger example of the documentation: two callbacks only with both messages, and the newest string."""
-    talker, node = local.talker.node("talker"), local.context.node("node")
+    talker, node = bench.talker.node("talker"), bench.context.node("node")
     said: list[str] = []
     text = node.subscription(String, "text", lambda m: said.append(m.data), Qos(depth=1))
     number = node.subscription(Int32, "number", lambda m: said.append(str(m.data)), Qos(depth=1))
-    executor = local.executor(trigger=all_of(text, number))
+    executor = bench.executor(trigger=all_of(text, number))
     executor.add(text)
     executor.add(number)
     texts, numbers = talker.publisher(String, "text"), talker.publisher(Int32, "number")
+    bench.settle()
     for i in range(1, 7):
         texts.publish(String(data=f"Hello World!{i}"))
+        bench.settle()
         executor.spin_some()
         if i % 3 == 0:
             numbers.publish(Int32(data=i))
+            bench.settle()
             executor.spin_some()
     assert said == ["Hello World!3", "3", "Hello World!6", "6"]
 
@@ -474,15 +466,15 @@ def test_until_a_trigger_says_so_nothing_runs_early(local: InSpace, how: str) ->
     assert subscription.lost == 3
 
 
-def test_x27_trigger_of_the_users_own(local: InSpace) -> None:
-    topics = Topics(local, 2)
+def test_x27_trigger_of_the_users_own(bench: Bench) -> None:
+    topics = Topics(bench, 2)
     seen: list[list[Any]] = []
 
     def both(handles: list[Any]) -> bool:
         seen.append(list(handles))
-        return all(handle.ready(local.context.clock()) for handle in handles)
+        return all(handle.ready(bench.context.clock()) for handle in handles)
 
-    executor = local.executor(trigger=both)
+    executor = bench.executor(trigger=both)
     for subscription in topics.subscriptions:
         executor.add(subscription)
     topics.say((1, 1))
@@ -516,10 +508,10 @@ def test_x28_x29_x30_services(bench: Bench) -> None:
     assert {len(identity) for identity in seen} == {24}
 
 
-def test_x31_a_callback_with_a_context_is_a_closure(local: InSpace) -> None:
-    topics = Topics(local, 1)
+def test_x31_a_callback_with_a_context_is_a_closure(bench: Bench) -> None:
+    topics = Topics(bench, 1)
     got: list[tuple[int, int]] = []
-    executor = local.executor()
+    executor = bench.executor()
     context_value = 42
     executor.add(topics.subscriptions[0], lambda message: got.append((context_value, message.data)))
     topics.say((0, 1))
@@ -527,10 +519,10 @@ def test_x31_a_callback_with_a_context_is_a_closure(local: InSpace) -> None:
     assert got == [(42, 1)]
 
 
-def test_x32_x33_guard_conditions(local: InSpace) -> None:
+def test_x32_x33_guard_conditions(bench: Bench) -> None:
     calls: list[int] = []
-    guard = GuardCondition(local.context, lambda: calls.append(1))
-    executor = local.executor()
+    guard = GuardCondition(bench.context, lambda: calls.append(1))
+    executor = bench.executor()
     executor.add(guard)
     guard.trigger()
     guard.trigger()
@@ -749,18 +741,18 @@ def test_timers_of_hosts_are_exact(local: InSpace) -> None:
 # Handles, and what errors are called
 
 
-def test_h1_to_h5_handles(local: InSpace) -> None:
+def test_h1_to_h5_handles(bench: Bench) -> None:
     """What a handle is when it is made, when an executor has it, and when it is gone."""
     from muros.rclc.executor import Handle
 
-    bare = Handle(local.context)
+    bare = Handle(bench.context)
     assert (bare.entity, bare.handles, bare.eager) == (None, None, True)
     assert bare.left(0) >= 1_000_000, "it is never ready by itself"
-    assert local.context.handles == [bare]
+    assert bench.context.handles == [bare]
     bare.destroy()
-    assert local.context.handles == []
-    subscription = local.context.node("n").subscription(Int32, "topic", print)
-    executor = local.executor()
+    assert bench.context.handles == []
+    subscription = bench.context.node("n").subscription(Int32, "topic", print)
+    executor = bench.executor()
     executor.add(subscription)
     assert subscription.handles is executor.handles
     assert subscription.entity is not None
@@ -768,10 +760,10 @@ def test_h1_to_h5_handles(local: InSpace) -> None:
     assert executor.handles == []
 
 
-def test_x6_removing_what_is_not_there(local: InSpace) -> None:
-    executor = local.executor()
-    timer = local.context.node("n").timer(1.0, print)
-    executor.add(local.context.node("n").timer(2.0, print))
+def test_x6_removing_what_is_not_there(bench: Bench) -> None:
+    executor = bench.executor()
+    timer = bench.context.node("n").timer(1.0, print)
+    executor.add(bench.context.node("n").timer(2.0, print))
     with pytest.raises(HandleError) as absent:
         executor.remove(timer)
     assert str(absent.value) == "print, the callback of the timer of 1000 ms, is not in this executor"

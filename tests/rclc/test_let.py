@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -35,7 +35,7 @@ from muros.rclc.let import OVERRUN, Task
 from muros.space import Topic
 from tests.client.world import World
 from tests.rclc.test_rclc import Board
-from tests.rclc.virtual import WAYS, Bench, InSpace
+from tests.rclc.virtual import Bench, InSpace
 
 from example_interfaces.action import Fibonacci
 from example_interfaces.srv import AddTwoInts
@@ -43,22 +43,6 @@ from std_msgs.msg import Int32
 
 PERIOD = 10
 """Milliseconds."""
-
-
-@pytest.fixture(params=WAYS)
-def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
-    """Two contexts, on each of the ways."""
-    made = WAYS[request.param]()
-    yield made
-    made.close()
-
-
-@pytest.fixture
-def local() -> Iterator[InSpace]:
-    """Two contexts in a space."""
-    made = InSpace()
-    yield made
-    made.close()
 
 
 class Heard:

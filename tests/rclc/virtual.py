@@ -16,6 +16,10 @@ class Bench:
     context: Context
     now: int
 
+    def open(self) -> Context:
+        """One more context."""
+        raise NotImplementedError
+
     def executor(self, *arguments: Any, **options: Any) -> Executor:
         """An executor of the context."""
         return Executor(self.context, *arguments, **options)
@@ -81,6 +85,11 @@ class ThroughAgent(Bench):
         self.world = World()
         self._boards = [Board(self.world, name, history=16) for name in ("talker", "board")]
         self.talker, self.context = (board.context for board in self._boards)
+
+    def open(self) -> Context:
+        """One more context."""
+        self._boards.append(Board(self.world, f"b{len(self._boards)}", history=16))
+        return self._boards[-1].context
 
     @property
     def now(self) -> int:  # type: ignore[override]
