@@ -145,21 +145,12 @@ def keeping(seen: Changes, agrees: list[bool]) -> Callable[[Parameter | None, Pa
     return decide
 
 
-_ALONE: list[Context] = []
-
-
-@pytest.fixture(autouse=True)
-def _leave_nobody() -> Iterator[None]:
-    """Contexts that a test opened for itself end with it."""
-    yield
-    while _ALONE:
-        _ALONE.pop().close()
-
-
-def node_alone() -> Node:
-    """A node that nobody else needs to see."""
-    _ALONE.append(Context("local:"))
-    return _ALONE[-1].node("server")
+@pytest.fixture
+def server(stage: Stage) -> Node:
+    """A node that is there for all to see, though nobody asks it anything."""
+    made = stage.node("server")
+    stage.meet()
+    return made
 
 
 def names(parameters: Any) -> list[str]:
@@ -170,24 +161,22 @@ def names(parameters: Any) -> list[str]:
 # ---- what needs nobody else ----
 
 
-def test_p1_init() -> None:
-    node = node_alone()
-    parameters = node.parameters()
-    executor = Executor(node.context, handles=6)
+def test_p1_init(server: Node) -> None:
+    parameters = server.parameters()
+    executor = Executor(server.context, handles=6)
     for handle in parameters.handles:
         executor.add(handle)
     with pytest.raises(CapacityError):
-        executor.add(node.timer(1.0, print))
+        executor.add(server.timer(1.0, print))
     with pytest.raises(RclError, match="has parameters already"):
-        node.parameters()
+        server.parameters()
     parameters.on_change(None)
     parameters.destroy()
-    node.parameters()
-    node.context.close()
+    server.parameters()
 
 
-def test_p2_add() -> None:
-    parameters = node_alone().parameters(max=4, longest=49)
+def test_p2_add(server: Node) -> None:
+    parameters = server.parameters(max=4, longest=49)
     for i, value in enumerate((True, 1, 1.0, False)):
         parameters.declare(f"p{i}", value)
     for name, kind in (("p1", ParameterError), ("x" * 50, ParameterError), ("fifth", RclError)):
@@ -200,15 +189,15 @@ def test_p2_add() -> None:
 
 
 @pytest.mark.parametrize("name", [None, "", 3])
-def test_p2_add_without_a_name(name: Any) -> None:
+def test_p2_add_without_a_name(server: Node, name: Any) -> None:
     with pytest.raises(InvalidParameterError) as caught:
-        node_alone().parameters().declare(name, 1)
+        server.parameters().declare(name, 1)
     assert caught.value.code == 11
 
 
 @pytest.mark.parametrize("value", [None, object(), [1, "a"], [1, 2.0], [None], [], {}, 1 << 63, [[1]]])
-def test_what_can_be_no_value(value: Any) -> None:
-    parameters = node_alone().parameters()
+def test_what_can_be_no_value(server: Node, value: Any) -> None:
+    parameters = server.parameters()
     with pytest.raises(InvalidParameterError, match="a value is a bool"):
         parameters.declare("x", value)
     parameters.declare("y", 1)
@@ -217,8 +206,8 @@ def test_what_can_be_no_value(value: Any) -> None:
     assert parameters.get("y") == 1
 
 
-def test_p3_constraint() -> None:
-    parameters = node_alone().parameters()
+def test_p3_constraint(server: Node) -> None:
+    parameters = server.parameters()
     parameters.declare("int", 0, range=(0, 10, 1))
     parameters.declare("double", 0.0)
     parameters.constrain("double", range=(0, 0.1, 0.01))
@@ -252,8 +241,8 @@ def test_p3_constraint() -> None:
         (0.0, (-0.5, 1.0, 0.5), [-0.5, 0.5, 1.0], [0.25]),
     ],
 )
-def test_ranges_are_enforced(first: Any, span: Any, good: Any, bad: Any) -> None:
-    parameters = node_alone().parameters()
+def test_ranges_are_enforced(server: Node, first: Any, span: Any, good: Any, bad: Any) -> None:
+    parameters = server.parameters()
     parameters.declare("x", first, range=span)
     for value in good:
         parameters.set("x", value)
@@ -264,8 +253,8 @@ def test_ranges_are_enforced(first: Any, span: Any, good: Any, bad: Any) -> None
     assert parameters.get("x") == good[-1]
 
 
-def test_p4_description() -> None:
-    parameters = node_alone().parameters(longest=49)
+def test_p4_description(server: Node) -> None:
+    parameters = server.parameters(longest=49)
     parameters.declare("x", 1, description="what it is")
     parameters.constrain("x", constraints="and more")
     assert parameters.describe("x").description == "what it is"
@@ -277,15 +266,15 @@ def test_p4_description() -> None:
         with pytest.raises(ParameterError) as caught:
             call()
         assert caught.value.code == 1
-    small = node_alone().parameters(low_memory=True)
+    small = server.context.node("small").parameters(low_memory=True)
     with pytest.raises(ParameterMemoryError) as memory:
         small.declare("x", 1, description="what it is")
     assert memory.value.code == CODES["describe in low memory mode"]
     small.declare("x", 1)
 
 
-def test_p5_read_only() -> None:
-    parameters = node_alone().parameters()
+def test_p5_read_only(server: Node) -> None:
+    parameters = server.parameters()
     parameters.declare("x", 1, read_only=True)
     parameters.set("x", 2)  # of ours
     assert parameters.get("x") == 2
@@ -296,8 +285,8 @@ def test_p5_read_only() -> None:
         parameters.constrain("nobody", read_only=True)
 
 
-def test_p6_local_set_and_get() -> None:
-    parameters = node_alone().parameters()
+def test_p6_local_set_and_get(server: Node) -> None:
+    parameters = server.parameters()
     seen: Changes = []
     agrees = [True]
     parameters.on_change(keeping(seen, agrees))
@@ -333,8 +322,8 @@ def test_p6_local_set_and_get() -> None:
     assert not seen
 
 
-def test_p8_local_delete() -> None:
-    parameters = node_alone().parameters()
+def test_p8_local_delete(server: Node) -> None:
+    parameters = server.parameters()
     seen: Changes = []
     parameters.on_change(keeping(seen, [False]))
     parameters.declare("x", 1)
@@ -345,8 +334,8 @@ def test_p8_local_delete() -> None:
     assert not seen
 
 
-def test_p15_in_the_callback() -> None:
-    parameters = node_alone().parameters()
+def test_p15_in_the_callback(server: Node) -> None:
+    parameters = server.parameters()
     parameters.declare("x", 1)
     raised: list[ParameterChangingError] = []
 
@@ -370,8 +359,8 @@ def test_p15_in_the_callback() -> None:
     parameters.set("x", 3)
 
 
-def test_a_callback_that_raises_changes_nothing() -> None:
-    parameters = node_alone().parameters()
+def test_a_callback_that_raises_changes_nothing(server: Node) -> None:
+    parameters = server.parameters()
     parameters.declare("x", 1)
 
     def fail(old: Parameter | None, new: Parameter | None) -> bool:
@@ -385,8 +374,8 @@ def test_a_callback_that_raises_changes_nothing() -> None:
     parameters.set("x", 2)
 
 
-def test_several_of_ours_at_once_all_or_none() -> None:
-    parameters = node_alone().parameters()
+def test_several_of_ours_at_once_all_or_none(server: Node) -> None:
+    parameters = server.parameters()
     parameters.declare("a", 1)
     parameters.declare("b", 2, range=(0, 5))
     with pytest.raises(ParameterRejectedError):
@@ -396,8 +385,8 @@ def test_several_of_ours_at_once_all_or_none() -> None:
     assert (parameters.get("a"), parameters.get("b")) == (2, 5)
 
 
-def test_a_value_is_kept_apart_from_what_it_was_made_of() -> None:
-    parameters = node_alone().parameters()
+def test_a_value_is_kept_apart_from_what_it_was_made_of(server: Node) -> None:
+    parameters = server.parameters()
     given = [1, 2]
     parameters.declare("x", given)
     given.append(3)
