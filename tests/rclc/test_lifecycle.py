@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from muros.rclc import CapacityError, Executor, RclError, TransitionError, lifecycle_states, lifecycles
 from muros.rclc.lifecycle import Lifecycle
-from tests.client.world import World
-from tests.rclc.test_rclc import Board
+from tests.rclc.virtual import WAYS, Bench
 
 from std_msgs.msg import Int32
 
@@ -22,20 +21,21 @@ UNCONFIGURED, INACTIVE, ACTIVE, FINALIZED = 1, 2, 3, 4
 
 
 class Managed:
-    """A managed node on a board: what its callbacks do, what it tells and what was called."""
+    """A managed node: what its callbacks do, what it tells and what was called."""
 
-    def __init__(self, services: bool = True, **does: Callable[[], object]) -> None:
-        self.board = Board(World())
+    def __init__(self, bench: Bench, services: bool = True, **does: Callable[[], object]) -> None:
+        self.node = bench.context.node("board")
         self.called: list[str] = []
         self.problems: list[tuple[int, str]] = []
-        self.board.context.on_problem(lambda code, text: self.problems.append((code, text)))
+        self.node.context.on_problem(lambda code, text: self.problems.append((code, text)))
         callbacks: Any = {f"on_{name}": self._callback(name, does.get(name)) for name in LABELS}
-        self.lifecycle: Lifecycle = self.board.node.lifecycle(
+        self.lifecycle: Lifecycle = self.node.lifecycle(
             services=services, time=lambda: (1700000000, 5), **callbacks
         )
         self.events: list[Any] = []
         events: Any = self.lifecycle.events
         events.publish = self._keep
+        bench.settle()
 
     def _callback(self, name: str, does: Callable[[], object] | None) -> Callable[[], object]:
         def callback() -> object:
@@ -75,17 +75,17 @@ def test_the_table_is_that_of_ros() -> None:
     assert [name for name, _ in lifecycle_states.SERVICES] == names
 
 
-def test_l1_create_and_destroy() -> None:
-    managed = Managed()
+def test_l1_create_and_destroy(bench: Bench) -> None:
+    managed = Managed(bench)
     assert managed.lifecycle.state == TABLE["initial_state"] == "unconfigured"
     assert len(managed.lifecycle.services) == 5
-    managed.board.node.destroy()
-    assert managed.board.context.handles == []
-    assert Managed(services=False).lifecycle.services == []
+    managed.node.destroy()
+    assert managed.node.context.handles == []
+    assert Managed(bench, services=False).lifecycle.services == []
 
 
-def test_l2_to_active_and_back() -> None:
-    managed = Managed()
+def test_l2_to_active_and_back(bench: Bench) -> None:
+    managed = Managed(bench)
     states = []
     for transition in ("configure", "activate", "deactivate", "cleanup"):
         managed.go(transition)
@@ -93,8 +93,8 @@ def test_l2_to_active_and_back() -> None:
     assert states == [INACTIVE, ACTIVE, INACTIVE, UNCONFIGURED]
 
 
-def test_l3_callbacks_are_called_in_their_order() -> None:
-    managed = Managed()
+def test_l3_callbacks_are_called_in_their_order(bench: Bench) -> None:
+    managed = Managed(bench)
     lifecycle = managed.lifecycle
     for n, step in enumerate(
         (lifecycle.configure, lifecycle.activate, lifecycle.deactivate, lifecycle.cleanup), 1
@@ -103,26 +103,26 @@ def test_l3_callbacks_are_called_in_their_order() -> None:
         assert managed.called == list(LABELS[:n])
 
 
-def test_l4_services_are_handles_that_an_executor_counts() -> None:
-    managed = Managed()
+def test_l4_services_are_handles_that_an_executor_counts(bench: Bench) -> None:
+    managed = Managed(bench)
     first, second, third, *_ = managed.lifecycle.services
-    small = Executor(managed.board.context, handles=1)
+    small = Executor(managed.node.context, handles=1)
     small.add(first)
     with pytest.raises(CapacityError, match="handles=2"):
         small.add(second)
-    large = Executor(managed.board.context, handles=3)
+    large = Executor(managed.node.context, handles=3)
     for handle in (first, second, third):
         large.add(handle)
 
 
 @pytest.mark.parametrize("case", TABLE["cases"], ids=lambda case: "-".join(case["do"]))
-def test_cases(case: dict[str, Any]) -> None:
+def test_cases(bench: Bench, case: dict[str, Any]) -> None:
     does: Any = {}
     for word in case["do"]:
         name, _, how = word.rstrip(")").partition("(")
         if how:
             does[name] = {"fails": fail, "raises": crash}[how]
-    managed = Managed(**does)
+    managed = Managed(bench, **does)
     results = []
     for word in case["do"]:
         transition = word.partition("(")[0]
@@ -140,10 +140,12 @@ def test_cases(case: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("start", ["unconfigured", "inactive", "active", "finalized"])
 @pytest.mark.parametrize("row", TABLE["transitions"], ids=lambda row: f"{row['id']}")
-def test_each_transition_is_legal_from_its_own_state_alone(start: str, row: dict[str, Any]) -> None:
+def test_each_transition_is_legal_from_its_own_state_alone(
+    bench: Bench, start: str, row: dict[str, Any]
+) -> None:
     """By its number; labels of steps that nobody may ask for are refused too."""
     ways = {"inactive": ["configure"], "active": ["configure", "activate"], "finalized": ["shutdown"]}
-    managed = Managed().go(*ways.get(start, []))
+    managed = Managed(bench).go(*ways.get(start, []))
     managed.events.clear()
     if row["start"] == start:
         assert managed.lifecycle.change(row["id"])
@@ -164,10 +166,10 @@ def test_each_transition_is_legal_from_its_own_state_alone(start: str, row: dict
 )
 @pytest.mark.parametrize("does", [None, fail])
 def test_shutdown_from_everywhere_ends_in_finalized(
-    way: list[str], does: Callable[[], object] | None
+    bench: Bench, way: list[str], does: Callable[[], object] | None
 ) -> None:
     callbacks: Any = {"shutdown": does} if does else {}
-    managed = Managed(**callbacks).go(*way)
+    managed = Managed(bench, **callbacks).go(*way)
     assert managed.lifecycle.shutdown() is (does is None)
     assert (managed.lifecycle.state, managed.called[-1]) == ("finalized", "shutdown")
     assert managed.steps()[-1] == ("shuttingdown", "finalized")
@@ -181,10 +183,12 @@ def test_shutdown_from_everywhere_ends_in_finalized(
     [(None, "unconfigured"), (fail, "finalized"), (crash, "finalized")],
     ids=["recovers", "fails", "raises"],
 )
-def test_what_raises_is_an_error(name: str, on_error: Callable[[], object] | None, final: str) -> None:
+def test_what_raises_is_an_error(
+    bench: Bench, name: str, on_error: Callable[[], object] | None, final: str
+) -> None:
     way = {"activate": ["configure"], "deactivate": ["configure", "activate"], "cleanup": ["configure"]}
     does: Any = {name: crash} | ({"error": on_error} if on_error else {})
-    managed = Managed(**does).go(*way.get(name, []))
+    managed = Managed(bench, **does).go(*way.get(name, []))
     assert not managed.lifecycle.change(name)
     assert managed.lifecycle.state == final
     assert managed.called[-2:] == [name, "error"]
@@ -194,8 +198,8 @@ def test_what_raises_is_an_error(name: str, on_error: Callable[[], object] | Non
     assert len(managed.problems) == (2 if on_error is crash else 1)
 
 
-def test_an_error_without_callback_is_the_end() -> None:
-    node = Board(World()).node
+def test_an_error_without_callback_is_the_end(bench: Bench) -> None:
+    node = bench.context.node("board")
     node.context.on_problem(lambda code, text: None)
     lifecycle = node.lifecycle(on_configure=crash)
     assert not lifecycle.configure()
@@ -206,14 +210,14 @@ def test_an_error_without_callback_is_the_end() -> None:
     ("result", "state"),
     [(None, 2), (True, 2), (97, 2), ("done", 2), (0, 2), (False, 1), (98, 1), (99, 4)],
 )
-def test_what_callbacks_return(result: object, state: int) -> None:
-    lifecycle = Board(World()).node.lifecycle(on_configure=lambda: result)
+def test_what_callbacks_return(bench: Bench, result: object, state: int) -> None:
+    lifecycle = bench.context.node("board").lifecycle(on_configure=lambda: result)
     assert lifecycle.configure() is (state == INACTIVE)
     assert lifecycle.id == state
 
 
-def test_no_transition_within_a_transition() -> None:
-    managed = Managed(configure=lambda: managed.lifecycle.activate())
+def test_no_transition_within_a_transition(bench: Bench) -> None:
+    managed = Managed(bench, configure=lambda: managed.lifecycle.activate())
     assert not managed.lifecycle.configure()
     assert isinstance(managed.lifecycle.error, TransitionError)
     assert (
@@ -221,10 +225,10 @@ def test_no_transition_within_a_transition() -> None:
     )
 
 
-def test_events_bear_the_time() -> None:
-    managed = Managed().go("configure")
+def test_events_bear_the_time(bench: Bench) -> None:
+    managed = Managed(bench).go("configure")
     assert [(event.stamp.sec, event.stamp.nanosec) for event in managed.events] == [(1700000000, 5)] * 2
-    lifecycle = Board(World()).node.lifecycle()
+    lifecycle = bench.context.node("board").lifecycle()
     told: list[Any] = []
     events: Any = lifecycle.events
     events.publish = told.append  # which says None: not taken
@@ -233,8 +237,8 @@ def test_events_bear_the_time() -> None:
     assert lifecycle.lost == 2
 
 
-def test_managed_publishers_publish_while_active_alone() -> None:
-    managed = Managed()
+def test_managed_publishers_publish_while_active_alone(bench: Bench) -> None:
+    managed = Managed(bench)
     publisher = managed.lifecycle.publisher(Int32, "value")
     sent: list[int] = []
     inner: Any = publisher.inner
@@ -275,8 +279,8 @@ def test_managed_publishers_publish_while_active_alone() -> None:
     assert managed.lifecycle.publishers == []
 
 
-def test_one_lifecycle_for_each_node() -> None:
-    node = Board(World()).node
+def test_one_lifecycle_for_each_node(bench: Bench) -> None:
+    node = bench.context.node("board")
     node.lifecycle()
     handles = list(node.context.handles)
     with pytest.raises(RclError, match="node board has a lifecycle already"):
@@ -284,22 +288,23 @@ def test_one_lifecycle_for_each_node() -> None:
     assert node.context.handles == handles
 
 
-def test_a_lifecycle_that_cannot_be_made_leaves_nothing() -> None:
-    board = Board(World())
-    node = board.context.node("n" * 30)
+@pytest.mark.parametrize("bench", ["agent"], indirect=True)  # the length of names is bounded there alone
+def test_a_lifecycle_that_cannot_be_made_leaves_nothing(bench: Bench) -> None:
+    node = bench.context.node("n" * 30)
     with pytest.raises(ValueError, match=r"characters"):
         node.lifecycle()
-    assert (node.entities, board.context.handles) == ([], [])
+    assert (node.entities, bench.context.handles) == ([], [])
 
 
 @pytest.mark.parametrize("name", ["on_configure", "on_error", "time"])
-def test_callbacks_must_be_callable(name: str) -> None:
+def test_callbacks_must_be_callable(bench: Bench, name: str) -> None:
     wrong: Any = {name: 5}
     with pytest.raises(TypeError, match="a callback of a lifecycle is a function, not 5") as caught:
-        Board(World()).node.lifecycle(**wrong)
+        bench.context.node("board").lifecycle(**wrong)
     assert getattr(caught.value, "code", None) == 11
 
 
+@pytest.mark.parametrize("way", WAYS)
 @given(
     st.lists(
         st.tuples(
@@ -311,11 +316,12 @@ def test_callbacks_must_be_callable(name: str) -> None:
     st.sampled_from([97, 98, 99]),
 )
 def test_whatever_is_asked_every_step_is_one_of_the_table(
-    asked: list[tuple[int | str, object]], on_error: int
+    way: str, asked: list[tuple[int | str, object]], on_error: int
 ) -> None:
     result: object = None
     does: Any = {name: lambda: result for name in LABELS[:5]} | {"error": lambda: on_error}
-    managed = Managed(**does)
+    bench = WAYS[way]()
+    managed = Managed(bench, **does)
     known = {(row["id"], row["label"], row["start_id"], row["goal_id"]) for row in TABLE["transitions"]}
     for transition, result in asked:
         before, steps = managed.lifecycle.id, len(managed.events)
@@ -333,3 +339,4 @@ def test_whatever_is_asked_every_step_is_one_of_the_table(
             assert event.start_state.id == at
             at = event.goal_state.id
         assert at == managed.lifecycle.id
+    bench.close()
