@@ -1,7 +1,6 @@
 """Entities over every way, by the ids of the acceptance cases: E1 to E18 of the C library, R1 to R23 of its middleware.
 
-What has no case here has one elsewhere: R6 (topics are part of writers and readers), R7 and R8 in
-`tests/client/test_streaming.py`, R24 in the memory tests. What is null in C is None here.
+What has no case here has one elsewhere: R24 is in the memory tests. What is null in C is None here.
 """
 
 import json
@@ -17,8 +16,9 @@ import pytest
 
 import muros.rclc
 from muros.client import Qos, TimeSync, Udp, discover, ping
+from muros.client.raw import Raw
 from muros.links import DiscoveryLink, UdpLink
-from muros.rclc import Context, Executor, GuardCondition, InvalidNameError, Node
+from muros.rclc import Context, Executor, GuardCondition, InvalidNameError, Node, Streamer
 from tests.client.agent_thread import RunningAgent
 from tests.rclc_space.ways import PATIENCE, Stage
 
@@ -30,6 +30,10 @@ CODES: dict[str, dict[str, int]] = json.loads(
 )
 INVALID_ARGUMENT = CODES["rcl"]["INVALID_ARGUMENT"]
 NONE: Any = None
+
+
+LARGE = 30_000
+"""Characters of a text that takes many messages."""
 
 
 def nothing(*_: object) -> None:
@@ -253,6 +257,35 @@ def test_r2_r6_several_on_one_topic_share_nothing(stage: Stage) -> None:
     first.destroy()
     pair.got.clear()
     stage.until(lambda: 3 in pair.got, lambda: second.publish(Int32(data=3)))
+
+
+def test_r7_continuous_fragment(stage: Stage) -> None:
+    pair = Pair(stage)
+    text = "".join(chr(32 + i % 90) for i in range(LARGE))
+    publisher = pair.one.publisher(String, "value")
+    pair.other.subscription(String, "value", lambda message: pair.got.append(message.data))
+    stage.meet(publisher)
+    stage.publish(publisher, String(data=text))
+    stage.until(lambda: pair.got)
+    assert pair.got == [text]
+
+
+def test_r8_continuous_fragment_with_callbacks(stage: Stage) -> None:
+    pair = Pair(stage)
+    body = String(data="head: " + "x" * 9_999).serialize()
+    ended: list[bool] = []
+
+    def fill(buf: bytearray, off: int, n: int, at: int) -> None:
+        buf[off : off + n] = body[10 + at : 10 + at + n]
+
+    publisher = pair.one.publisher(String, "value")
+    pair.other.subscription(String, "value", lambda message: pair.got.append(message.data))
+    streamer = Streamer(publisher, fill, 0, more=lambda: len(body) - 10, on_end=ended.append)
+    stage.meet(publisher)
+    assert len(body) == 10_010
+    stage.until(lambda: streamer.publish(Raw(body[:10])))
+    stage.until(lambda: pair.got and ended)
+    assert (pair.got, ended) == (["head: " + "x" * 9_999], [True])
 
 
 def test_r9_publish_and_receive(stage: Stage) -> None:
