@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from muros.interfaces import message
 from muros.rclc import DiagnosticUpdater
 from muros.rclc.diagnostics import ERROR, WARN, Task
 from tests.cli.scene import Scene
-from tests.rclc_space.ways import Direct, Stage
+from tests.rclc_space.ways import Stage
 
 VECTORS: dict[str, Any] = json.loads((Path(__file__).parents[1] / "vectors/rmw/diagnostics.json").read_text())
 ARRAY = message("diagnostic_msgs/msg/DiagnosticArray")
@@ -40,14 +39,6 @@ updaters:
         2: {name: present}
     2: {name: motor}
 """
-
-
-@pytest.fixture
-def stage() -> Iterator[Stage]:
-    """Nodes in a local space."""
-    made = Stage(Direct("local:"))
-    yield made
-    made.close()
 
 
 def pairs(status: Any) -> list[tuple[str, str]]:
