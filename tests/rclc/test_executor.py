@@ -247,6 +247,23 @@ def test_x15_a_cancelled_timer_stops_no_messages(bench: Bench) -> None:
     assert topics.got == [(0, 0), (0, 1), (0, 2)]
 
 
+def test_x16_spin_some_api(bench: Bench) -> None:
+    topics = Topics(bench, 1)
+    executor = bench.executor()
+    for wrong in (cast(Any, "x"), math.nan, cast(Any, [])):
+        with pytest.raises(ValueError, match=r"timeout is .*: it must be a number of seconds") as caught:
+            executor.spin_some(wrong)
+        assert getattr(caught.value, "code", None) == 11
+    start = bench.now
+    assert (executor.spin_some(), bench.now) == (False, start), "it does not wait unless told to"
+    assert executor.spin_some(0.1) is False
+    assert bench.now == start + 100, "nothing has come"
+    topics.say((0, 42))
+    start = bench.now
+    assert executor.spin_some(0.1) is True
+    assert (topics.got, bench.now) == ([(0, 42)], start)
+
+
 def test_x17_pub_sub_example(bench: Bench) -> None:
     topics = Topics(bench, 1)
     topics.say((0, 42))

@@ -1,10 +1,9 @@
 """Entities over every way, by the ids of the acceptance cases: E1 to E18 of the C library, R1 to R23 of its middleware.
 
-What has no case here has one elsewhere: R24 is in the memory tests. What is null in C is None here.
+What has no case here has one elsewhere: R22 with the epoch, R24 with the memory. What is null in C is None here.
 """
 
 import json
-import time
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
@@ -15,12 +14,14 @@ from typing import Any
 import pytest
 
 import muros.rclc
-from muros.client import Qos, TimeSync, Udp, discover, ping
+from muros.client import Qos, Udp, discover, ping
 from muros.client.raw import Raw
 from muros.links import DiscoveryLink, UdpLink
 from muros.rclc import Context, Executor, GuardCondition, InvalidNameError, Node, Streamer
+from muros.space import open_space
 from tests.client.agent_thread import RunningAgent
-from tests.rclc_space.ways import PATIENCE, Stage
+from tests.dds.domains import free_domain
+from tests.rclc_space.ways import PATIENCE, Stage, ThroughAgent
 
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32, String
@@ -86,20 +87,37 @@ class Pair:
                 executor.spin_some(0.002)
 
 
-def test_e1_init_without_a_way_or_with_one_that_is_none() -> None:
+def test_e1_init(stage: Stage) -> None:
+    context = stage.run(stage.way.open())
+    stage.until(lambda: context.wait_connected(0.001))
     refused(lambda: Context(None))
     refused(lambda: Context(NONE, 5))
-    refused(lambda: Context(Udp))
-    refused(lambda: Context("nothing:"))
+    if isinstance(stage.way, ThroughAgent):
+        transport = stage.way.transport()
+        refused(lambda: Context(Udp))
+        refused(lambda: Context(transport, 0))
+        refused(lambda: Context(transport, space=open_space("local:")))
+    else:
+        refused(lambda: Context("nothing:"))
+        refused(lambda: Context("local:", 5))
 
 
 def test_e2_init_with_a_domain(stage: Stage) -> None:
-    refused(lambda: Context("local:", domain_id=233))
-    refused(lambda: Context("local:", domain_id=-1))
-    context = Context("local:", domain_id=7)
-    assert context.domain_id == 7
-    context.node("one")
-    context.close()
+    refused(lambda: stage.way.open(233))
+    refused(lambda: stage.way.open(-1))
+    with free_domain() as ours, free_domain() as theirs:
+        talker, listener, other = (stage.run(stage.way.open(domain)) for domain in (ours, ours, theirs))
+        assert (talker.domain_id, other.domain_id) == (ours, theirs)
+        got: list[int] = []
+        strange: list[int] = []
+        listener.node("one").subscription(Int32, "value", lambda message: got.append(message.data))
+        other.node("one").subscription(Int32, "value", lambda message: strange.append(message.data))
+        publisher = talker.node("one").publisher(Int32, "value")
+        stage.meet(publisher)
+        stage.until(lambda: len(got) > 2, lambda: publisher.publish(Int32(data=7)))
+        assert set(got) == {7}
+        assert strange == []
+        stage.close()
 
 
 def test_e3_closing_twice_is_harmless(stage: Stage) -> None:
@@ -440,30 +458,33 @@ def test_r19_init_and_shutdown_again(stage: Stage) -> None:
     assert not context.wait_connected(0.01)
 
 
-def test_r20_to_r22_an_agent_is_found_asked_and_believed() -> None:
+def test_r20_autodiscover(stage: Stage) -> None:
+    if stage.way.direct:
+        assert stage.way.open().ping(0.0), "there is nobody to look for"
+        return
     data, door = UdpLink(0, "127.0.0.1"), DiscoveryLink(0)
     agent = RunningAgent(data, door)
     try:
         ((host, port),) = discover(["127.0.0.1"], door.port, attempts=5)
-        transport = Udp(host, port)
-        assert ping(transport, 5), "before there is a session"
-        transport.close()
         context = Context(Udp(host, port))
-        context.node("one")
         assert context.wait_connected(PATIENCE)
-        assert context.ping(PATIENCE), "and within it"
-        session: Any = context.middleware
-        sync = TimeSync(session)
-        end = time.monotonic() + PATIENCE
-        while not sync.synchronized():
-            assert time.monotonic() < end
-            sync.request()
-            context.middleware.wait(100)
-            context.middleware.spin_once()
-        assert abs(sync.time()[0] - time.time()) <= 5
+        assert context.ping(PATIENCE), "it works afterwards"
         context.close()
     finally:
         agent.stop()
+
+
+def test_r21_agent_ping(stage: Stage) -> None:
+    if isinstance(stage.way, ThroughAgent):
+        transport = stage.way.transport()
+        assert ping(transport, 5), "before there is a session"
+        transport.close()
+    context = stage.way.open()
+    context.node("one")
+    assert context.wait_connected(PATIENCE)
+    assert context.ping(PATIENCE), "and within it"
+    context.close()
+    assert not context.ping(0.05)
 
 
 def test_r23_guard_condition(stage: Stage) -> None:

@@ -7,9 +7,8 @@ from muros.rclc import Context, Epoch
 from tests.rclc_space.ways import Stage
 
 
-def test_c6_epoch(stage: Stage) -> None:
-    context = stage.way.open()
-    stage.contexts.append(context)
+def test_r22_sync_session(stage: Stage) -> None:
+    context = stage.run(stage.way.open())
     epoch = Epoch(context)
     context.node("board")
     if stage.way.direct:

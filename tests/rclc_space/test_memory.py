@@ -2,8 +2,7 @@
 
 import pytest
 
-from muros.client import Session, Udp
-from muros.rclc import Context, Executor, Rules, Streamer
+from muros.rclc import Context, Rules, Streamer
 from muros.rclc.memory import REFUSED
 from tests.rclc_space.ways import Stage, ThroughAgent
 
@@ -55,9 +54,7 @@ def test_an_image_of_200_kb(stage: Stage) -> None:
     camera = stage.node("camera")
     came: list[Image] = []
     if isinstance(stage.way, ThroughAgent):
-        context = Context(Session(Udp("127.0.0.1", stage.way._link.port), largest=SIZE + 1000))
-        stage.contexts.append(context)
-        stage.executors.append(Executor(context))
+        context = stage.run(Context(stage.way.transport(), largest=SIZE + 1000))
         context.node("screen").subscription(Image, "image", came.append)
     else:
         stage.node("screen").subscription(Image, "image", came.append)

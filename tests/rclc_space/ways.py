@@ -19,8 +19,8 @@ class Way(Protocol):
     direct: bool
     """Whether there is no agent between."""
 
-    def open(self) -> Context:
-        """A new context."""
+    def open(self, domain_id: int | None = None) -> Context:
+        """A new context, in the way's own domain or another."""
 
     def close(self) -> None:
         """Ends what the contexts went through."""
@@ -35,9 +35,13 @@ class ThroughAgent:
         self._link = UdpLink(0, "127.0.0.1")
         self._agent = RunningAgent(self._link)
 
-    def open(self) -> Context:
-        """A new context."""
-        return Context(Udp("127.0.0.1", self._link.port))
+    def transport(self) -> Udp:
+        """A board's way to the agent."""
+        return Udp("127.0.0.1", self._link.port)
+
+    def open(self, domain_id: int | None = None) -> Context:
+        """A new context, in domain 0 or another."""
+        return Context(self.transport(), domain_id=domain_id)
 
     def close(self) -> None:
         """Stops the agent."""
@@ -52,9 +56,11 @@ class Direct:
     def __init__(self, url: str) -> None:
         self.url = url
 
-    def open(self) -> Context:
-        """A new context."""
-        return Context(self.url)
+    def open(self, domain_id: int | None = None) -> Context:
+        """A new context, in the URL's domain or another."""
+        if domain_id is None:
+            return Context(self.url)
+        return Context(self.url.partition(":")[0] + ":", domain_id=domain_id)
 
     def close(self) -> None:
         """The last context closes the space."""
@@ -70,10 +76,13 @@ class Stage:
 
     def node(self, name: str, namespace: str = "") -> Node:
         """A node in a context of its own, which `until` spins."""
-        context = self.way.open()
+        return self.run(self.way.open()).node(name, namespace)
+
+    def run(self, context: Context) -> Context:
+        """Has `until` spin a context, too."""
         self.contexts.append(context)
         self.executors.append(Executor(context))
-        return context.node(name, namespace)
+        return context
 
     def until(self, condition: Callable[[], Any], every: Callable[[], object] | None = None) -> None:
         """Spins everybody until a condition holds, doing something in between."""
