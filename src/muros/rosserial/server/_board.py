@@ -110,12 +110,6 @@ _OPEN = 3_000
 """How long a topic request may still be answered, in ms."""
 _BOOT = 2_000
 """Silence until other rates are tried: boards may start when their port is opened, in ms."""
-_PACE_OF = 8
-"""So many messages make the average of a board's pace."""
-_MISSED = 3
-"""So many are missed until it counts as silent."""
-_PAUSE = 1_000
-"""A shorter pause means nothing, in ms."""
 _CHECK_AFTER = 700
 """Silence before checks begin, in ms."""
 _TRIES = 3
@@ -180,8 +174,6 @@ class Board:
         self._told_ready = False
         self._told_lost = False
         self._checked_at = 0
-        self._pace = float(core.limits.silent)
-        """Time between its messages, on average, in ms."""
 
     @property
     def in_sync(self) -> bool:
@@ -282,6 +274,7 @@ class Board:
             self._watch(now)
         elif self.state == SILENT:
             if now >= self._asked_at + self.core.limits.ask:
+                self.roster.forget()  # what has waited so long is too old to be carried out
                 self._ask(now)
             if not self._told_lost and now >= self.heard_at + self.core.limits.lost:
                 self._lose(f"silent for {(now - self.heard_at) / 1000:.0f} s", now)
@@ -317,6 +310,8 @@ class Board:
         elif self.state == SYNCED:
             if self._settle_at is not None:
                 self.wake(self._settle_at)
+            elif self._repeats():
+                self.wake(self._asked_at + limits.ask)
             if self.last_time is not None:
                 self.wake(self.connected_at + self._patience())
                 if limits.check and self.version == VERSION_HYDRO:
@@ -328,11 +323,12 @@ class Board:
         limits = self.core.limits
         if self._settle_at is not None and now >= self._settle_at:
             self._settled(now)
+        elif self._repeats() and now >= self._asked_at + limits.ask:
+            self._ask(now)
         if self.last_time is None:
             return  # it never asks for the time: its silence means nothing
         silence = now - self.connected_at
         if silence >= self._patience():
-            self._pace = float(limits.silent)  # it may have become quiet
             self._step(SILENCE)
             self.roster.doubt()
             self._ask(now)
@@ -346,15 +342,23 @@ class Board:
             self.output.post(CHECK)
 
     def _patience(self) -> int:
-        """How long it may show no sign. Boards of Groovy cannot be checked, so their own pace is what one can go by."""
-        silent = self.core.limits.silent
-        if self.version != VERSION_GROOVY:
-            return silent
-        return min(silent, max(_PAUSE, int(_MISSED * self._pace)))
+        """How long it may show no sign of being connected. Boards of Groovy cannot be checked, only asked."""
+        limits = self.core.limits
+        return min(limits.silent, limits.quiet) if self.version == VERSION_GROOVY else limits.silent
+
+    def _repeats(self) -> bool:
+        """Whether a topic request got lost, as the board says something and has not named what it has."""
+        return self._settle_at is None and bool(self._open_asks)
 
     def _step(self, what: str) -> None:
         self.state = TRANSITIONS.get((self.state, what), self.state)
+        self.output.holds = self.state != SYNCED or self.roster.in_doubt
+
+    def _be_sure(self) -> None:
+        """The board has named what it has: what waits for it may go."""
+        self.roster.in_doubt = False
         self.output.holds = self.state != SYNCED
+        self.roster.resume()
 
     # Negotiation
 
@@ -407,6 +411,8 @@ class Board:
     def _settled(self, now: int) -> None:
         """The board has said everything, as far as one can tell."""
         self._settle_at = None
+        if self.roster.in_doubt:
+            self._be_sure()
         missing = self.roster.missing()
         damaged = self.suspicions.damage != self._damage
         if (missing or damaged or self.roster.halved()) and self._misses < (_TRIES if damaged else _MISSES):
@@ -414,6 +420,7 @@ class Board:
             self._ask(now)
             return
         self._misses = 0
+        self._open_asks.clear()
         for endpoint in missing:
             self.roster.remove(endpoint)
         if not self._told_ready and self.node is not None:
@@ -462,7 +469,6 @@ class Board:
         self.heard_at = now
         receive = self._incoming.get(topic_id)
         if receive is not None:
-            self._pace += (now - self.connected_at - self._pace) / _PACE_OF
             self.connected_at = now
             if self.state == SILENT:
                 self._heard_again(now)
@@ -545,6 +551,8 @@ class Board:
             self.output_buffer = max(self.output_buffer, info.buffer_size)
             self.decoder.limit = min(self.core.limits.max_payload, max(self.output_buffer, OVERHEAD))
         self.roster.named(half, info)
+        if self.roster.in_doubt and all(endpoint.confirmed for endpoint in self.roster.endpoints.values()):
+            self._be_sure()
 
     def _answered_topics(self, now: int) -> None:
         if self.state != SYNCED or self.node is None:

@@ -124,6 +124,7 @@ class Subscription(Endpoint):
         self.subscriber: Subscriber | None = None
         self._queued = False
         self._waiting: deque[bytes] = deque()
+        self._most = board.core.limits.backlog
 
     def begin(self, subscriber: Subscriber) -> None:
         """Its counterpart is there."""
@@ -159,7 +160,11 @@ class Subscription(Endpoint):
             self.subscriber.forget()
 
     def resume(self) -> None:
-        """What has waited in the world may go."""
+        """What has waited in the world may go, all of it: it was not the line that it waited for."""
+        if self.board.output.byte_us:
+            while (body := self._take()) is not None:
+                self._waiting.append(body)
+            self._most = max(self._most, len(self._waiting))
         self.on_data()
 
     def _take(self) -> bytes | None:
@@ -174,9 +179,11 @@ class Subscription(Endpoint):
         """Lets what is old go, where the line is slower than what is published."""
         waiting = self._waiting
         dropped = 0
+        if not waiting:
+            self._most = self.board.core.limits.backlog
         while (body := self._take()) is not None:
             waiting.append(body)
-            if len(waiting) > self.board.core.limits.backlog:
+            if len(waiting) > self._most:
                 waiting.popleft()
                 dropped += 1
         if dropped:
@@ -236,7 +243,7 @@ class ServiceServer(Endpoint):
         board = self.board
         assert self.server is not None
         info = self.infos[1]
-        while board.in_sync and self.confirmed:
+        while self.confirmed and not board.output.holds:
             try:
                 taken = self.server.take()
             except BodyError as error:
@@ -348,14 +355,20 @@ class ServiceClient(Endpoint):
             self._waiting.append(number)
             if len(self._waiting) > self.board.core.limits.max_requests:
                 self._waiting.popleft()
+        self.resume()
+        return True
+
+    def resume(self) -> None:
+        """Answers that could not be passed on when they came have their turn."""
         early, self._early = self._early, []
         for answer in early:
             self.on_reply(*answer)
-        return True
 
     def on_reply(self, number: int, body: bytes) -> None:
         """An answer for the board. Those to calls that it made before it started again are dropped."""
-        if self._calling:  # it came before the number of its call was known
+        if (
+            self._calling or self.board.output.holds
+        ):  # the call's number, or what the board has, is not known yet
             self._early.append((number, body))
             return
         if number not in self._waiting:
@@ -371,6 +384,7 @@ class ServiceClient(Endpoint):
     def restart(self) -> None:
         """The board waits for nothing any more."""
         self._waiting.clear()
+        self._early.clear()
 
     def close(self) -> None:
         """Takes it out of the world."""

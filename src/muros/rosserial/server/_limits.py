@@ -8,6 +8,7 @@ __all__ = ["Limits"]
 
 _AT_LEAST_ONE = (
     "ask",
+    "quiet",
     "settle",
     "lead",
     "backlog",
@@ -31,6 +32,8 @@ class Limits:
     """Period of looking, while a board sends nothing, whether it has started again; 0: never."""
     silent: int = 3_500
     """Silence of a board that asks for the time every 2.5 s, after which it is asked for its topics again."""
+    quiet: int = 1_500
+    """Silence of a board of Groovy after which it is asked for its topics: nothing else tells of a restart."""
     lost: int = 11_000
     """Silence after which a board counts as lost: ros_lib itself gives the connection up then."""
     keep_lost: int = 30_000

@@ -67,8 +67,10 @@ class _Node:
         self.overrides: dict[str, Any] = {}
         self._participant = participant
 
-    def service(self, type_: Any, name: str, answer: Callable[[Any], Any], qos: str) -> _Service:
-        """A service of the node."""
+    def service(
+        self, type_: Any, name: str, answer: Callable[[Any], Any], qos: str, memory: object = None
+    ) -> _Service:
+        """A service of the node; its memory is not bounded."""
         return _Service(self._participant, type_, self._full(name), answer, qos)
 
     def publisher(self, type_: Any, name: str, qos: str) -> _Publisher:

@@ -53,6 +53,8 @@ class Roster:
         self.board = board
         self.endpoints: dict[Key, Endpoint] = {}
         self.incoming: dict[int, Callable[[bytes, int], bool]] = {}
+        self.in_doubt = False
+        """Whether nothing is sent on any id until the board has said what it has: it stands still meanwhile."""
         self._halves: dict[tuple[int, str], tuple[int, dict[int, TopicInfo]]] = {}
         self._most = board.core.limits.max_endpoints
 
@@ -120,6 +122,18 @@ class Roster:
         """The board may have started again: nothing goes to an id until it has named it again."""
         for endpoint in self.endpoints.values():
             endpoint.confirmed = False
+            self.in_doubt = self.board.output.holds = True
+
+    def resume(self) -> None:
+        """What has waited for the board may go."""
+        for endpoint in self.endpoints.values():
+            endpoint.resume()
+
+    def forget(self) -> None:
+        """Drops what has waited for the board's topics."""
+        for endpoint in self.endpoints.values():
+            if isinstance(endpoint, Subscription):
+                endpoint.restart()
 
     def close(self) -> None:
         """Takes everything out of the world."""

@@ -1,0 +1,160 @@
+"""Boards at the end of serial lines that take their time, with buffers as small as an Arduino's."""
+
+from __future__ import annotations
+
+from collections import deque
+from random import Random
+from statistics import median
+from typing import Any
+
+import pytest
+
+from muros.rosserial.constants import VERSION_GROOVY, VERSION_HYDRO
+from muros.rosserial.server import BoardLost
+from tests.rosserial.scene import RosLib, Scene, string
+
+STRING = "std_msgs/msg/String"
+BYTE = "std_msgs/msg/Byte"
+RING = 64
+"""Bytes that an Arduino keeps in each direction."""
+
+
+class Uart:
+    """The line of one board: bytes arrive one after the other, and the board stands still while it has to write.
+
+    What comes meanwhile finds room for 64 bytes and is lost beyond. A board that does not run hears nothing.
+    """
+
+    def __init__(self, board: RosLib, baud: int) -> None:
+        self.byte_us = 10e6 / baud
+        self.board = board
+        self.lost = 0
+        self.sent_up = 0
+        self._rising: deque[tuple[float, int]] = deque()
+        self._falling: deque[tuple[float, int]] = deque()
+        self._spin, self._deliver, self._send = board.tick, board.raw, board.scene.link.send
+        board.raw = self.up  # type: ignore[method-assign]
+        board.tick = self.tick  # type: ignore[method-assign]
+        board.scene.link.send = self.down  # type: ignore[method-assign]
+
+    def up(self, data: bytes) -> None:
+        """From the board."""
+        self.sent_up += len(data)
+        self._queue(self._rising, data)
+
+    def down(self, message: bytes, address: Any) -> bool:
+        """To the board."""
+        if address != self.board.address:
+            return self._send(message, address)
+        self._queue(self._falling, message)
+        return True
+
+    def tick(self) -> None:
+        """A millisecond has passed: what has arrived meanwhile is delivered."""
+        now_us = 1000 * self.board.scene.now
+        came = bytearray()
+        while self._rising and self._rising[0][0] <= now_us:
+            came.append(self._rising.popleft()[1])
+        if came:
+            self._deliver(bytes(came))
+        while self._falling and self._falling[0][0] <= now_us:
+            byte = self._falling.popleft()[1]
+            if len(self.board.came) < RING and self.board.running:
+                self.board.came.append(byte)
+            elif self.board.running:
+                self.lost += 1
+        if len(self._rising) <= RING:
+            self._spin()
+
+    def _queue(self, way: deque[tuple[float, int]], data: bytes) -> None:
+        free = max(way[-1][0] if way else 0.0, 1000.0 * self.board.scene.now)
+        for i, byte in enumerate(data, 1):
+            way.append((free + i * self.byte_us, byte))
+
+
+def restart(scene: Scene, board: RosLib, boot: int) -> None:
+    """The board starts again, which takes ``boot`` ms."""
+    board.running = board.connected = False
+    scene.step(boot)
+    board.boot()
+    board.running = True
+
+
+@pytest.mark.parametrize("version", [VERSION_HYDRO, VERSION_GROOVY])
+@pytest.mark.parametrize("period", [0, 20, 300, 1_900])
+def test_a_restarted_board_is_back_within_two_seconds(version: int, period: int) -> None:
+    """Whatever it publishes, whenever it restarts, however long it takes to start: within 2 s from when it runs."""
+    random = Random(period)
+    scene = Scene(baud=57_600)
+    board = RosLib(scene, version=version)
+    for i in range(4):
+        board.subscriber(f"wheel_{i}", "std_msgs/Byte")
+    chatter = board.publisher("chatter", "std_msgs/String")
+    Uart(board, 57_600)
+    board.plug()
+    scene.until(lambda: board.connected)
+    for _ in range(6):
+        for i in range(random.randrange(300, 6_000)):
+            if period and i % period == 0:
+                board.send(chatter, string(str(i)))
+            scene.step()
+        restart(scene, board, random.choice([0, 50, 700, 1_600, 4_000, 12_000]))
+        assert scene.until(lambda: board.connected, within=12_000) <= 2_000
+
+
+def test_a_groovy_board_that_talks_is_left_alone() -> None:
+    scene = Scene(baud=57_600)
+    board = RosLib(scene, version=VERSION_GROOVY)
+    chatter = board.publisher("chatter", "std_msgs/String")
+    Uart(board, 57_600)
+    board.plug()
+    scene.step(1_000)
+    for i in range(40):
+        board.send(chatter, string(str(i)))
+        scene.step(1_400)
+    assert scene.core.boards[0].asks == 1
+
+
+def test_a_quiet_groovy_board_that_is_well_loses_nothing() -> None:
+    """It is asked, as nothing else tells whether it has restarted, and stands still as long as its list is on the line.
+
+    What goes to it waits in the server meanwhile, as it would not find room in the board.
+    """
+    scene = Scene(baud=57_600)
+    board = RosLib(scene, version=VERSION_GROOVY)
+    wheels = [board.subscriber(f"wheel_{i}", "std_msgs/Byte") for i in range(8)]
+    chatter = board.publisher("chatter", "std_msgs/String")
+    line = Uart(board, 57_600)
+    board.plug()
+    scene.step(1_000)
+    write = scene.writer("/wheel_3", BYTE)
+    hear = scene.reader("/chatter", STRING)
+    random = Random(1)
+    start, asks = scene.now, scene.core.boards[0].asks
+    said: list[int] = []
+    wrote: list[int] = []
+    up: list[int] = []
+    down: list[int] = []
+    for _ in range(60_000):
+        if random.random() < 0.05:
+            write(data=len(wrote) % 256)
+            wrote.append(scene.now)
+        if random.random() < 0.0003:
+            board.send(chatter, string("I am well"))
+            said.append(scene.now)
+        scene.step()
+        for body in board.taken(wheels[3]):
+            assert body == bytes([len(down) % 256])
+            down.append(scene.now - wrote[len(down)])
+        up += [scene.now - said[len(up) + i] for i, _ in enumerate(hear())]
+    scene.step(300)
+    assert len(down) + len(board.taken(wheels[3])) == len(wrote)
+    assert len(up) + len(hear()) == len(said)
+    assert line.lost == 0
+    assert not scene.told
+    assert not scene.said(BoardLost)
+    listing = sum(7 + info.size() for _, info in board.infos) * line.byte_us / 1000
+    assert median(down) <= 2
+    assert max(down) <= listing + 10
+    assert max(up) <= listing + 10
+    assert 20 <= scene.core.boards[0].asks - asks <= (scene.now - start) / 1_500
