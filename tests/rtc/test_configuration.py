@@ -26,11 +26,12 @@ SPEC = {
     "__widget__": {"a": "slider.1"},
 }
 BOUND = {"a": 5, "b": 1.5, "c": "bound", "d": [0.0], "e": True}
+CANNOT_ACTIVATE = "Configuration.activate_configuration_set()"
 NOT_AVAILABLE = "NotAvailable: Configuration.get_active_configuration_set()"
 ERRORS = {
     f"NotAvailable: SDOPackage.NotAvailable(description='{NOT_AVAILABLE}')": NotAvailableError,
     "InvalidParameter: SDOPackage.InvalidParameter(description='ID is empty.')": EmptyIdError,
-    "InternalError: SDOPackage.InternalError(description='Configuration.activate_configuration_set()')": ActivationError,
+    f"InternalError: SDOPackage.InternalError(description='{CANNOT_ACTIVATE}')": ActivationError,
     "InternalError: SDOPackage.InternalError(description='No such ConfigurationSet')": UnknownSetError,
 }
 
