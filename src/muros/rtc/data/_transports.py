@@ -1,0 +1,134 @@
+"""What carries octets from an OutPort to an InPort: the registry of transports, and what each has to offer.
+
+A transport has two ends. The end that is *called* is offered when a connection is negotiated (push: by the InPort,
+pull: by the OutPort): what it adds to the connector's properties leads the other end to it. The end that *calls* is
+made from those properties afterwards.
+
+    push    InPort  `offer_inlet(put)`    ...properties...>   OutPort `reach_inlet()`  .put(octets)
+    pull    OutPort `offer_outlet(get)`   ...properties...>   InPort  `reach_outlet()` .get()
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Final, Protocol, TypeAlias
+
+from muros.rtc.codes import PortStatus, RtcError
+from muros.rtc.data._types import AnyDataType
+from muros.rtc.profiles import ConnectorProfile, PropertyValue
+from muros.rtc.reports import Reporter
+
+__all__ = [
+    "TRANSPORTS",
+    "Connection",
+    "Get",
+    "Inlet",
+    "Offer",
+    "Outlet",
+    "PullTransport",
+    "PushTransport",
+    "Put",
+    "TransportError",
+    "register_transport",
+]
+
+Put: TypeAlias = "Callable[[bytes], PortStatus]"
+"""What an InPort does with octets that come: stores them and answers. Never raises. Any thread may call it."""
+
+Get: TypeAlias = "Callable[[], tuple[PortStatus, bytes]]"
+"""What an OutPort gives when it is asked: octets with PORT_OK, or no octets and why. Never raises. Any thread."""
+
+
+class TransportError(RtcError):
+    """A connection cannot be made this way: its properties lead nowhere; the text says which and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """What a transport is told of the connection it is to carry."""
+
+    profile: ConnectorProfile
+    """As it stands at this step of the negotiation."""
+    options: Mapping[str, str]
+    """The effective properties of this side, without `dataport.` and `dataport.inport.` or `dataport.outport.`."""
+    data_type: AnyDataType
+    """Of this side's port."""
+    little: bool
+    """The endianness agreed on."""
+    port_name: str
+    """`<instance>.<port>`, for findings."""
+    reporter: Reporter
+
+
+class Offer(Protocol):
+    """The end that is called, standing."""
+
+    @property
+    def properties(self) -> Mapping[str, PropertyValue]:
+        """What the connector's profile needs for the other end to reach this one."""
+
+    def close(self) -> None:
+        """Take it away. Closing twice is allowed."""
+
+
+class Inlet(Protocol):
+    """The way to an InPort, as its OutPort has it. Used by one thread at a time."""
+
+    def put(self, octets: bytes) -> PortStatus:
+        """Bring `octets` (not changed afterwards) there; what the InPort answers. PeerLostError if nobody does."""
+
+    def close(self) -> None:
+        """Forget the way. Closing twice is allowed."""
+
+
+class Outlet(Protocol):
+    """The way to an OutPort, as its InPort has it. Used by one thread at a time."""
+
+    def get(self) -> tuple[PortStatus, bytes]:
+        """Fetch a value's octets; BUFFER_EMPTY and none if there is no value. PeerLostError if nobody answers."""
+
+    def close(self) -> None:
+        """Forget the way. Closing twice is allowed."""
+
+
+class PushTransport(Protocol):
+    """Octets are brought by the OutPort."""
+
+    def offer_inlet(self, connection: Connection, put: Put) -> Offer:
+        """Of the InPort: an object that calls `put`."""
+
+    def reach_inlet(self, connection: Connection) -> Inlet:
+        """Of the OutPort: the way to the InPort that the profile's properties tell of. TransportError if none does."""
+
+
+class PullTransport(Protocol):
+    """Octets are fetched by the InPort."""
+
+    def offer_outlet(self, connection: Connection, get: Get) -> Offer:
+        """Of the OutPort: an object that calls `get`."""
+
+    def reach_outlet(self, connection: Connection) -> Outlet:
+        """Of the InPort: the way to the OutPort that the profile's properties tell of. TransportError if none does."""
+
+
+class _Registry:
+    """Transports by `dataport.interface_type`, in the order of registering."""
+
+    def __init__(self) -> None:
+        self.push: Final[dict[str, PushTransport]] = {}
+        self.pull: Final[dict[str, PullTransport]] = {}
+
+
+TRANSPORTS: Final = _Registry()
+"""What connections may ask for, besides what data ports have themselves (`direct`)."""
+
+
+def register_transport(
+    interface_type: str, *, push: PushTransport | None = None, pull: PullTransport | None = None
+) -> None:
+    """Let connections ask for `dataport.interface_type` = `interface_type`, with the dataflow types given."""
+    if push is not None:
+        TRANSPORTS.push[interface_type] = push
+    if pull is not None:
+        TRANSPORTS.pull[interface_type] = pull
