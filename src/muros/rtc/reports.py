@@ -50,6 +50,19 @@ class Reporter:
                 severity=severity,
             )
 
+    def take(self, finding: Finding) -> None:
+        """Count a finding that somebody made as a value."""
+        self.report(
+            finding.code,
+            who=finding.who,
+            what=finding.what,
+            why=finding.why,
+            remedy=finding.remedy,
+            subject=finding.subject,
+            n=finding.new,
+            severity=finding.severity,
+        )
+
     def again(self, code: str, *, who: str, subject: str = "", n: int = 1) -> bool:
         """Count `n` more of one that was reported before; False where it was not."""
         with self._lock:
