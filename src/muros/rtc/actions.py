@@ -88,7 +88,8 @@ def join_names(component: type) -> None:
 def return_code_of(value: Any) -> ReturnCode:
     """The return code that an action's value means.
 
-    None is RTC_OK; members of the enumerations that IDL compilers make count by their number. Raises InvalidReturnError for other values.
+    None is RTC_OK; members of the enumerations that IDL compilers make count by their number.
+    Raises InvalidReturnError for other values.
     """
     if value is None:
         return ReturnCode.RTC_OK

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, cast, runtime_checkable
 
 from muros.rtc.actions import ActionPoint, ComponentEvent, join_names
 from muros.rtc.codes import LifeCycleState, ReturnCode, RtcError
@@ -52,6 +52,24 @@ class Declaration(Protocol):
 
     def make(self, component: Component) -> object:
         """Make the real one for `component`."""
+
+
+@runtime_checkable
+class ReadBefore(Protocol):
+    """A port that can be read before every `on_execute` (`Component.reads_all`)."""
+
+    def read_before(self) -> bool:
+        """Read it; whether there was something."""
+        ...
+
+
+@runtime_checkable
+class WrittenAfter(Protocol):
+    """A port that can be written after every `on_execute` (`Component.writes_all`)."""
+
+    def write_after(self) -> bool:
+        """Write its value; whether it went."""
+        ...
 
 
 class Component:
@@ -252,12 +270,12 @@ class Component:
 
     def read_all(self) -> bool:
         """Read every InPort; whether all had something."""
-        had = [port.read_into() for port in self.ports if isinstance(port, DataInPort)]
+        had = [port.read_before() for port in self.ports if isinstance(port, ReadBefore)]
         return all(had)
 
     def write_all(self) -> bool:
         """Write every OutPort; whether all went."""
-        went = [port.write_from() for port in self.ports if isinstance(port, DataOutPort)]
+        went = [port.write_after() for port in self.ports if isinstance(port, WrittenAfter)]
         return all(went)
 
     # Its life
