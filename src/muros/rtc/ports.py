@@ -30,6 +30,7 @@ from typing import Final, Protocol
 
 from muros.findings import Finding, Severity
 from muros.rtc.codes import PeerLostError, PortType, ReturnCode
+from muros.rtc.listeners import Listeners
 from muros.rtc.profiles import ConnectorProfile, InterfaceProfile, PeerPort, PortProfile
 
 __all__ = ["ConnectEvent", "ConnectEventKind", "Port", "PortOwner"]
@@ -104,10 +105,11 @@ class Port:
         self.configuration: Mapping[str, str] = {}
         """The keys of rtc.conf that are meant for this port, without their prefix."""
         self.report: Callable[[Finding], object] = report or (lambda finding: None)
+        self.connect_listeners: Final = Listeners[ConnectEventKind](self._listener_failed)
+        """Called with a `ConnectEvent`, in the thread of whoever connects."""
         self._lock = threading.Lock()
         self._connections: dict[str, ConnectorProfile] = {}
         self._negotiated: dict[str, _Negotiation] = {}
-        self._listeners: dict[object, Callable[[ConnectEvent], object]] = {}
 
     # ---- what it is
 
@@ -168,21 +170,6 @@ class Port:
     def is_there(self) -> bool:
         """Always: a port of this process."""
         return True
-
-    def on_connect_event(self, callback: Callable[[ConnectEvent], object]) -> Callable[[], None]:
-        """Call `callback` at every `ConnectEventKind` from now on, in the thread of whoever connects.
-
-        Returns a function that ends it. What the callback raises is a finding.
-        """
-        key = object()
-        with self._lock:
-            self._listeners = {**self._listeners, key: callback}
-
-        def cancel() -> None:
-            with self._lock:
-                self._listeners = {k: v for k, v in self._listeners.items() if k is not key}
-
-        return cancel
 
     def activate(self) -> None:
         """The component has become active."""
@@ -426,11 +413,11 @@ class Port:
     def _announce(
         self, kind: ConnectEventKind, profile: ConnectorProfile, code: ReturnCode | None = None
     ) -> None:
-        for listener in self._listeners.values():
-            try:
-                listener(ConnectEvent(kind, self, profile, code))
-            except Exception as error:
-                self._tell("listener-failed", f"a listener of {kind.value} failed", _text(error))
+        if self.connect_listeners.of(kind):
+            self.connect_listeners.tell(kind, ConnectEvent(kind, self, profile, code))
+
+    def _listener_failed(self, kind: ConnectEventKind, error: Exception) -> None:
+        self._tell("listener-failed", f"a listener of {kind.value} failed", _text(error))
 
     def _refuse(
         self, profile: ConnectorProfile, code: ReturnCode, why: str, remedy: str = ""
