@@ -13,7 +13,7 @@ from muros.cli.diagnostics import line
 from muros.client import Session, Udp
 from muros.diagnostics import Bridge, read_table_untrusted
 from muros.interfaces import message
-from muros.rclc import Context, Executor
+from muros.rclc import Context, Executor, ParameterClient, ParameterError
 from tests.test_guides import PATIENCE, ROOT, Bench, bench, programs
 
 from sensor_msgs.msg import Image, JointState
@@ -31,7 +31,7 @@ def said(document: str, kind: str, number: int = 0) -> str:
     return text
 
 
-@pytest.mark.parametrize(("document", "count"), [(MEMORY, 2), (LARGE, 1), (DIAGNOSTICS, 1)])
+@pytest.mark.parametrize(("document", "count"), [(MEMORY, 3), (LARGE, 1), (DIAGNOSTICS, 1)])
 def test_no_program_goes_untested(document: str, count: int) -> None:
     assert len(programs(document)) == count
 
@@ -48,6 +48,22 @@ def test_rules(bench: Bench) -> None:
     bench.says_goodbye(running)
 
 
+def test_rules_of_parameters(bench: Bench) -> None:
+    assert bench.context.wait_connected(PATIENCE)
+    running = bench.start(MEMORY, 1)
+    client = ParameterClient(bench.node, "board", timeout=1.0)
+    assert client.wait(PATIENCE)
+    client.set("mode", "x" * 32)
+    assert client.get("mode") == "x" * 32
+    with pytest.raises(ParameterError, match="did not answer"):
+        client.set("mode", "x" * 33, timeout=0.2)
+    bench.until(lambda: running.lines)
+    (line,) = running.lines
+    assert line.startswith("problem 17 ")
+    assert line.endswith("dropped: parameters.value.string_value is longer than the rules allow")
+    bench.says_goodbye(running)
+
+
 def test_what_the_command_says(capsys: pytest.CaptureFixture[str]) -> None:
     text = said(MEMORY, "console")
     command, _, expected = text.partition("\n")
@@ -59,7 +75,7 @@ def test_a_text_in_its_place(bench: Bench) -> None:
     got: list[str] = []
     bench.node.subscription(String, "status", lambda message: got.append(message.data))
     assert bench.context.wait_connected(PATIENCE)
-    running = bench.start(MEMORY, 1)
+    running = bench.start(MEMORY, 2)
     bench.until(lambda: len(got) >= 2)
     assert set(got) == {"running, 21.5 degrees"}
     bench.says_goodbye(running)

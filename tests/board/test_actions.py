@@ -112,7 +112,9 @@ class Node:
     def clock(self) -> int:
         return self.now
 
-    def make(self, kind: "Any", name: str, callback: "Any" = None, qos: "Any" = None) -> Part:
+    def make(
+        self, kind: "Any", name: str, callback: "Any" = None, qos: "Any" = None, memory: "Any" = None
+    ) -> Part:
         made = Part(callback)
         self.entities.append(made)
         self.handles.append(made)

@@ -2,7 +2,7 @@
 
 from muros.client.chance import draw
 from muros.client.qos import Qos
-from muros.compat import const, ticks_add, ticks_diff
+from muros.compat import borrow, const, ticks_add, ticks_diff
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from muros.rclc.action_server import ActionServer
     from muros.rclc.context import Node
     from muros.rclc.goals import Goal
+    from muros.rclc.memory import Rules
 
 FULL = const(16)
 """The code with which a server tells ``on_problem`` that it has refused a goal, having as many as may be."""
@@ -36,11 +37,12 @@ def make_server(
     limits: "tuple[int, int, float]",
     clock: "Callable[[], tuple[int, int]] | None",
     types: "Any" = None,
+    memory: "Rules | None" = None,
 ) -> None:
     """Makes what a server needs.
 
     ``functions`` are on_execute, on_goal, on_cancel and on_accepted, ``limits`` goals, results and result_timeout,
-    ``types`` CancelGoal, GoalStatusArray and GoalStatus, None for those of a board.
+    ``types`` CancelGoal, GoalStatusArray and GoalStatus, None for those of a board, ``memory`` rules for goals.
     """
     made.on_execute, made.on_goal, made.on_cancel, made.on_accepted = functions
     made.capacity, made.keep = limits[0], limits[1]
@@ -54,7 +56,7 @@ def make_server(
     base = made.name + "/_action/"
     try:
         services = [
-            node.service(kind.SendGoal, base + "send_goal", made.take_goal),
+            node.service(kind.SendGoal, base + "send_goal", made.take_goal, memory=memory),
             node.service(cancel_kind, base + "cancel_goal", made.take_cancel),
             node.service(kind.GetResult, base + "get_result", made.take_result),
         ]
@@ -67,24 +69,45 @@ def make_server(
         _gather(made, node, before)
 
 
-def make_client(made: "ActionClient", node: "Node", kind: "Any", capacity: int, types: "Any" = None) -> None:
-    """Makes what a client needs; ``types`` as for servers."""
+def make_client(
+    made: "ActionClient",
+    node: "Node",
+    kind: "Any",
+    capacity: int,
+    types: "Any" = None,
+    memory: "Rules | None" = None,
+) -> None:
+    """Makes what a client needs; ``types`` as for servers, ``memory`` rules for what servers say."""
     cancel_kind, array_kind, _ = types or _types()
     made.kind, made.cancel_kind, made.capacity = kind, cancel_kind, capacity
+    takes = (cancel_kind.Response, kind.GetResult.Response, kind.FeedbackMessage, array_kind)
     before = len(node.entities)
     base = made.name + "/_action/"
     try:
+        cancels, results, feedback, states = bounds(memory, "action client %r" % made.name, takes)
         made.parts = [
             node.client(kind.SendGoal, base + "send_goal"),
-            node.client(cancel_kind, base + "cancel_goal"),
-            node.client(kind.GetResult, base + "get_result"),
-            node.subscription(kind.FeedbackMessage, base + "feedback", made.take_feedback),
+            node.client(cancel_kind, base + "cancel_goal", memory=cancels),
+            node.client(kind.GetResult, base + "get_result", memory=results),
+            node.subscription(kind.FeedbackMessage, base + "feedback", made.take_feedback, memory=feedback),
             node.subscription(
-                array_kind, base + "status", made.take_states, Qos(True, _STATES_KEPT, "transient_local")
+                array_kind,
+                base + "status",
+                made.take_states,
+                Qos(True, _STATES_KEPT, "transient_local"),
+                states,
             ),
         ]
     finally:
         _gather(made, node, before)
+
+
+def bounds(memory: "Rules | None", what: str, kinds: "tuple[Any, ...]") -> "list[Rules | None]":
+    """The rules for each of the types that ``what`` takes. RulesError for a rule that is for none of them."""
+    if memory is None:
+        return [None] * len(kinds)
+    made: "list[Rules | None]" = borrow("muros.rclc.memory_plan").divide(memory, what, kinds)
+    return made
 
 
 def _gather(made: "Any", node: "Node", before: int) -> None:

@@ -22,6 +22,7 @@ class Client(Handle):
     malformed = 0
 
     if TYPE_CHECKING:
+        refused: int  # responses beyond the rules for memory, where there are some, see ``memory``
         call = handles.call
         wait_for_service = handles.wait_for_service
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from muros.rclc import contexts, node
+    from muros.rclc import compositions, contexts, node
     from muros.rclc._types import Entity, Middleware
     from muros.rclc.executor import Handle
 
@@ -69,11 +69,11 @@ class Node:
         timer = node.timer
         service = node.service
         client = node.client
-        action_server = node.action_server
-        action_client = node.action_client
-        parameters = node.parameters
-        lifecycle = node.lifecycle
-        logger = node.logger
+        action_server = compositions.action_server
+        action_client = compositions.action_client
+        parameters = compositions.parameters
+        lifecycle = compositions.lifecycle
+        logger = compositions.logger
         destroy = node.destroy
         _topic = node._topic
         _resolve = node._resolve

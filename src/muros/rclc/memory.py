@@ -3,8 +3,9 @@
     rules = Rules({"name": 8, "name.data": 16}, numbers=32)
     node.subscription(JointState, "joint_states", on_state, memory=rules)
 
-A message beyond them is refused before any of it is taken, counted in ``refused`` of its subscription, and told as a
-problem with the path of what was too long. Boards need the shape of the type for that: ``muros board copy --rules``.
+Services, clients, both sides of actions and parameters take them too. A message beyond them is refused before any of
+it is taken, counted in ``refused`` of its handle, and told as a problem with the path of what was too long. Boards need
+the shape of the type for that: ``muros board copy --rules``.
 """
 
 from muros.cdr import integer
@@ -14,8 +15,8 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
 
+    from muros.rclc.executor import Handle
     from muros.rclc.host import memory as host_memory
-    from muros.rclc.subscription import Subscription
     from muros.xrce._types import Buffer
 
 REFUSED = const(17)
@@ -33,13 +34,19 @@ _FITS = const(-1)
 _STEP = const(3)
 
 
+class RulesError(ValueError):
+    """Rules that make no sense, or are for no member of what they are given for."""
+
+    code = 11
+
+
 class Rules:
     """How much the strings and sequences of messages may hold: elements of sequences, bytes of strings.
 
     ``rules`` has sizes for paths of member names, joined by dots, that go on in the elements of sequences; behind a
     sequence of strings ``.data`` stands for each of them. What has no rule is bounded by its type, or else by the
     default for ``strings``, for sequences of ``messages`` or strings, and of ``numbers``; 0 means the default. Raises
-    ValueError for sizes below 0.
+    RulesError, a ValueError, for sizes below 0.
 
     Hosts also say what that makes, see ``host.memory``: ``capacities(kind)``, ``size(kind)``, ``longest(kind)``.
     """
@@ -66,55 +73,75 @@ class Rules:
     ) -> None:
         self.rules = {} if rules is None else rules
         if min(strings, messages, numbers) < 0 or min(list(self.rules.values()) + [0]) < 0:
-            raise ValueError("rules are sizes, 0 or more")
+            raise RulesError("rules are sizes, 0 or more")
         self.strings = strings or 20
         self.messages = messages or 5
         self.numbers = numbers or 5
 
-    def guard(self, subscription: "Subscription", kind: "Any") -> "Any":
-        """What takes samples in place of a subscription, and hands on to it what keeps to the rules.
+    def guard(self, handle: "Handle", kind: "Any") -> "Any":
+        """What takes samples in place of a handle, and hands on to it what keeps to the rules.
 
-        Raises ValueError for a rule that is for no member of the type, and on boards without the type's shape.
+        ``kind`` is what comes to it: of a service the class of the requests. Raises RulesError for a rule that is for
+        no member of it, and on boards without its shape.
         """
         plan = borrow("muros.rclc.memory_plan").make(self, kind)
-        return Guard(self, subscription, kind, plan)
+        return (Guard if hasattr(handle, "take") else CallGuard)(handle, kind, plan)
 
 
 class Guard:
     """Stands before a subscription; see ``Rules.guard``."""
 
-    def __init__(self, rules: Rules, subscription: "Any", kind: "Any", plan: "list[int]") -> None:
-        subscription.refused = 0
-        self.rules = rules
-        self.subscription = subscription
+    def __init__(self, handle: "Any", kind: "Any", plan: "list[int]") -> None:
+        handle.refused = 0
+        self.handle = handle
         self.kind = kind
         self.plan = plan
         self._stack: "list[int]" = []
 
     def deliver(self, buf: "Buffer", off: int, n: int) -> None:
         """Takes a sample of the middleware."""
-        subscription = self.subscription
+        handle = self.handle
+        if self.keeps(buf, off, n):
+            if not MPY:
+                handle.deliver(buf, off, n)
+            else:
+                if handle.ready(0) and handle.eager:
+                    handle.run(0)  # what a callback raises is its own
+                try:
+                    handle.deliver(buf, off, n)
+                except MemoryError:
+                    self.refuse(n, _FITS)
+
+    def keeps(self, buf: "Buffer", off: int, n: int) -> bool:
+        """Whether a sample keeps to the rules; one that does not is refused."""
         step = check(self.plan, self._stack, buf, off, n)
         if step != _FITS:
-            self._refuse(n, step)
-        elif not MPY:
-            subscription.deliver(buf, off, n)
-        else:
-            if subscription.ready(0) and subscription.eager:
-                subscription.run(0)  # what a callback raises is its own
-            try:
-                subscription.deliver(buf, off, n)
-            except MemoryError:
-                self._refuse(n, _FITS)
+            self.refuse(n, step)
+        return step == _FITS
 
-    def _refuse(self, n: int, step: int) -> None:
-        count = self.subscription.refused + 1
-        self.subscription.refused = count
+    def refuse(self, n: int, step: int) -> None:
+        """Counts a sample of ``n`` bytes that breaks a step of the plan, -1 for one there was no memory for."""
+        count = self.handle.refused + 1
+        self.handle.refused = count
         if count & count - 1 == 0:  # the 1st, 2nd, 4th, 8th: a flood costs nothing
             try:
                 borrow("muros.rclc.memory_plan").tell(self, n, step)
             except MemoryError:
                 pass
+
+
+class CallGuard(Guard):
+    """Stands before a service, whose requests it looks at, or a client and its replies."""
+
+    def deliver(self, whose: "Any", buf: "Buffer", off: int, n: int) -> None:  # type: ignore[override]
+        """Takes a request or a reply of the middleware."""
+        if self.keeps(buf, off, n):
+            try:
+                self.handle.deliver(whose, buf, off, n)
+            except MemoryError:
+                if not MPY:
+                    raise
+                self.refuse(n, _FITS)
 
 
 def check(plan: "list[int]", stack: "list[int]", buf: "Buffer", off: int, n: int) -> int:

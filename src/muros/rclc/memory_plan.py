@@ -4,10 +4,11 @@ The words of a shape are explained where they are made, in ``muros.interfaces``.
 """
 
 from muros.compat import MPY, borrow, const
-from muros.rclc.memory import REFUSED
+from muros.rclc.memory import REFUSED, RulesError
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from typing import Any
 
     from muros.rclc.memory import Guard, Rules
@@ -23,7 +24,7 @@ _STEP = const(3)  # numbers for each
 
 
 def make(rules: "Rules", kind: "Any") -> "list[int]":
-    """The plan for a type: steps of three numbers. Raises ValueError for a rule that is for no member."""
+    """The plan for a type: steps of three numbers. Raises RulesError for a rule that is for no member."""
     plan: "list[int]" = []
     open_: "list[int]" = []
     known: "list[str]" = []
@@ -54,8 +55,27 @@ def make(rules: "Rules", kind: "Any") -> "list[int]":
                 plan += (_NUMBERS, most, int(form[0]))
     for path in rules.rules:
         if path not in known:
-            raise ValueError("%s has no string or sequence %r" % (kind.TYPE, path))
+            raise RulesError("%s has no string or sequence %r" % (kind.TYPE, path))
     return plan
+
+
+def divide(rules: "Rules", what: str, kinds: "Sequence[Any]") -> "list[Rules]":
+    """The rules for each of the types that ``what`` takes: those that are for members of the type.
+
+    Raises RulesError for a rule that is for no member of any; where ``what`` is empty, it may be for a type to come.
+    """
+    made = []
+    known: "list[str]" = []
+    for kind in kinds:
+        walker = Walker(kind)
+        paths = [walker.path for _ in walker if walker.path]
+        known += paths
+        mine = {path: rules.rules[path] for path in paths if path in rules.rules}
+        made.append(type(rules)(mine, rules.strings, rules.messages, rules.numbers))
+    for path in rules.rules:
+        if what and path not in known:
+            raise RulesError("%s takes no string or sequence %r" % (what, path))
+    return made
 
 
 class Walker:
@@ -111,7 +131,7 @@ def shape(kind: "Any") -> str:
     known = getattr(kind, "SHAPE", None)
     if known is None:
         if MPY:
-            raise ValueError("%s has no shape: make its class with muros board copy --rules" % kind.TYPE)
+            raise RulesError("%s has no shape: make its class with muros board copy --rules" % kind.TYPE)
         known = borrow("muros.interfaces").shape(kind.TYPE)
     found: str = known
     return found
@@ -136,7 +156,7 @@ def tell(guard: "Guard", n: int, step: int) -> None:
         text += "there is no memory for it"
     else:
         text += path(guard.kind, step) + " is longer than the rules allow"
-    middleware = guard.subscription.context.middleware
+    middleware = guard.handle.context.middleware
     if middleware.on_problem is not None:
         middleware.on_problem(REFUSED, text)
     elif not MPY:

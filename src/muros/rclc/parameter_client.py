@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from muros.rclc.client import Client
     from muros.rclc.context import Node
+    from muros.rclc.memory import Rules
 
 _TIMEOUT = const(5)  # seconds
 _ATTEMPT = const(1)  # seconds that one question of ``wait`` waits for its answer
@@ -25,11 +26,15 @@ _ATTEMPT = const(1)  # seconds that one question of ``wait`` waits for its answe
 class ParameterClient:
     """Asks the node ``target``, named as topics are, from ``node``. On hosts it loads and dumps YAML, see there.
 
-    Needs the types of rcl_interfaces, as parameters of our own do.
+    Needs the types of rcl_interfaces, as parameters of our own do. ``memory`` bounds what its answers take, such as
+    ``values.string_value`` or ``result.names``; one beyond it is none.
     """
 
-    def __init__(self, node: "Node", target: str, timeout: float = _TIMEOUT) -> None:
+    def __init__(
+        self, node: "Node", target: str, timeout: float = _TIMEOUT, memory: "Rules | None" = None
+    ) -> None:
         self.node = node
+        self.memory = memory
         self.target = node._resolve(target)
         self.timeout = timeout
         self._clients: "dict[str, Client]" = {}
@@ -200,7 +205,7 @@ class ParameterClient:
                 callback(event)
 
         kind = self._kind("msg/ParameterEvent")
-        return self.node.subscription(kind, "/parameter_events", heard, "parameters")
+        return self.node.subscription(kind, "/parameter_events", heard, "parameters", self._bounds(kind))
 
     def destroy(self) -> None:
         """Takes the clients away."""
@@ -223,7 +228,9 @@ class ParameterClient:
             timeout = self.timeout
         client = self._clients.get(suffix)
         if client is None:
-            client = self.node.client(self._kind("srv/" + service), self.target + "/" + suffix, "parameters")
+            kind = self._kind("srv/" + service)
+            name = self.target + "/" + suffix
+            client = self.node.client(kind, name, "parameters", self._bounds(kind.Response))
             self._clients[suffix] = client
         if then is None:
             response = client.call(request, timeout)
@@ -262,6 +269,13 @@ class ParameterClient:
             raise ParameterNotDeclaredError(
                 "%s has no parameter %s" % (self.target, " or ".join([repr(name) for name in names]))
             )
+
+    def _bounds(self, kind: "Any") -> "Rules | None":
+        """The rules that are for a type."""
+        if self.memory is None:
+            return None
+        mine: "Rules" = borrow("muros.rclc.memory_plan").divide(self.memory, "", [kind])[0]
+        return mine
 
     def _kind(self, name: str) -> "Any":
         """A type of rcl_interfaces."""

@@ -1,6 +1,6 @@
 """How parameters are made, described, listed and taken away. Boards borrow this."""
 
-from muros.compat import const
+from muros.compat import borrow, const
 from muros.rclc.parameter_rules import busy, tell, unknown, within
 from muros.rclc.parameter_values import TYPES, is_type, kept, kind_of
 from muros.rclc.parameters import Parameter
@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from muros.rclc.context import Node
+    from muros.rclc.memory import Rules
     from muros.rclc.parameters import Parameters
 
 _INTEGER = const(2)
@@ -28,6 +29,7 @@ def begin(
     longest: int,
     kind: "Callable[[str], Any] | None",
     clock: "Callable[[], int] | None",
+    memory: "Rules | None" = None,
 ) -> None:
     """Sets them up; arguments as for ``Node.parameters``. What cannot be made leaves nothing behind."""
     self.node = node
@@ -40,16 +42,23 @@ def begin(
     self.handles = []
     self.kind = find if kind is None else kind
     self.clock = clock
+    services = (
+        ("GetParameters", "get_parameters", self._get),
+        ("GetParameterTypes", "get_parameter_types", self._types),
+        ("SetParameters", "set_parameters", self._set),
+        ("SetParametersAtomically", "set_parameters_atomically", self._set_atomically),
+        ("ListParameters", "list_parameters", self._list),
+        ("DescribeParameters", "describe_parameters", self._describe),
+    )
+    kinds = [self.kind("srv/" + name) for name, _, _ in services]
+    bounds: "list[Rules | None]" = [None] * len(kinds)
+    if memory is not None:
+        requests = [kind.Request for kind in kinds]
+        bounds = borrow("muros.rclc.memory_plan").divide(memory, "a server of parameters", requests)
     try:
-        for name, suffix, answer in (
-            ("GetParameters", "get_parameters", self._get),
-            ("GetParameterTypes", "get_parameter_types", self._types),
-            ("SetParameters", "set_parameters", self._set),
-            ("SetParametersAtomically", "set_parameters_atomically", self._set_atomically),
-            ("ListParameters", "list_parameters", self._list),
-            ("DescribeParameters", "describe_parameters", self._describe),
-        ):
-            made = node.service(self.kind("srv/" + name), "~/" + suffix, answer, "parameters")
+        for i in range(len(kinds)):
+            _, suffix, answer = services[i]
+            made = node.service(kinds[i], "~/" + suffix, answer, "parameters", bounds[i])
             self.handles.append(made)
         if notify:
             self.events = node.publisher(self.kind("msg/ParameterEvent"), "/parameter_events", "parameters")

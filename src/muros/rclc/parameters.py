@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from muros.rclc import parameter_making, parameter_rules
     from muros.rclc._types import Publisher
     from muros.rclc.context import Node
+    from muros.rclc.memory import Rules
     from muros.rclc.service import Service
 
 
@@ -88,9 +89,10 @@ class Parameters:
         longest: int,
         kind: "Callable[[str], Any] | None" = None,
         clock: "Callable[[], int] | None" = None,
+        memory: "Rules | None" = None,
     ) -> None:
         borrow("muros.rclc.parameter_making").begin(
-            self, node, max, notify, undeclared, low_memory, longest, kind, clock
+            self, node, max, notify, undeclared, low_memory, longest, kind, clock, memory
         )
 
     def get(self, name: str) -> "Any":

@@ -25,6 +25,9 @@ class Service(Handle):
     lost = 0
     malformed = 0
 
+    if TYPE_CHECKING:
+        refused: int  # requests beyond the rules for memory, where there are some, see ``memory``
+
     def __init__(self, context: "Context", kind: "Any", callback: "Callable[[Any], Any]") -> None:
         super().__init__(context)
         self.callback = callback

@@ -18,6 +18,7 @@ from muros.rclc.host.sharing import call_elsewhere, hand_over
 
 if TYPE_CHECKING:
     from muros.rclc.host.context import Context, Node
+    from muros.rclc.memory import Rules
 
 Callback = Callable[..., object] | None
 
@@ -121,6 +122,7 @@ def make_server(
     functions: tuple[Callback, Callback, Callback, Callback],
     limits: tuple[int, int, float],
     clock: Callable[[], tuple[int, int]] | None,
+    memory: Rules | None = None,
 ) -> ActionServer:
     """A server; arguments as for ``muros.rclc.actions.make_server``."""
     _be_action(kind)
@@ -139,11 +141,11 @@ def make_server(
         raise WrongValueError(f"result_timeout is {limits[2]!r}: it must be a number of seconds, at least 0")
     _be_name(node, name)
     made = ActionServer(node.context, name)
-    actions.make_server(made, node, kind, functions, limits, clock or _wall_clock, _types())
+    actions.make_server(made, node, kind, functions, limits, clock or _wall_clock, _types(), memory)
     return made
 
 
-def make_client(node: Node, kind: Any, name: str, capacity: int) -> ActionClient:
+def make_client(node: Node, kind: Any, name: str, capacity: int, memory: Rules | None = None) -> ActionClient:
     """A client; arguments as for ``muros.rclc.actions.make_client``."""
     _be_action(kind)
     if not isinstance(capacity, int) or capacity < 0:
@@ -152,7 +154,7 @@ def make_client(node: Node, kind: Any, name: str, capacity: int) -> ActionClient
         )
     _be_name(node, name)
     made = ActionClient(node.context, name)
-    actions.make_client(made, node, kind, capacity, _types())
+    actions.make_client(made, node, kind, capacity, _types(), memory)
     return made
 
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from muros.client.hosts import Session
 from muros.client.names import topic_name
 from muros.client.qos import profile
+from muros.rclc import compositions, contexts
 from muros.rclc import context as context_
-from muros.rclc import contexts
 from muros.rclc import node as node_
 from muros.rclc.errors import InvalidNameError, RclError
 from muros.rclc.host import logger as host_logger
@@ -217,11 +217,10 @@ class Node(context_.Node):
         made.topic = topic
         reader = self.context.middleware.reader
 
-        def read() -> Any:
-            taker = made if memory is None else memory.guard(made, kind)
+        def make(taker: Any) -> Any:
             return reader(self.participant, name, kind.TYPE, qos, taker.deliver)
 
-        return self._join(made, read)
+        return self._join(made, make, memory, kind)
 
     def timer(self, period: float, callback: Callable[[], object], autostart: bool = True) -> Timer:
         """A timer; an executor calls ``callback()`` every ``period`` seconds."""
@@ -233,9 +232,17 @@ class Node(context_.Node):
         return made
 
     def service(
-        self, kind: Any, name: str, callback: Callable[[Any], Any], qos: str | Qos = "services"
+        self,
+        kind: Any,
+        name: str,
+        callback: Callable[[Any], Any],
+        qos: str | Qos = "services",
+        memory: Rules | None = None,
     ) -> Service:
-        """A server of a service; ``callback(request)`` returns the response, or None to answer later."""
+        """A server of a service; ``callback(request)`` returns the response, or None to answer later.
+
+        ``memory`` bounds what requests take.
+        """
         be_service(kind)
         be_qos(qos)
         be_callable(callback, "the callback of a service")
@@ -243,12 +250,18 @@ class Node(context_.Node):
         made = self._service(kind, callback, qos)
         made.name = full
         replier = self.context.middleware.replier
-        self._join(made, lambda: replier(self.participant, made.name, kind.TYPE, made.deliver, qos))
+
+        def make(taker: Any) -> Any:
+            return replier(self.participant, full, kind.TYPE, taker.deliver, qos)
+
+        self._join(made, make, memory, kind.Request)
         self.context.services[made.name] = made
         return made
 
-    def client(self, kind: Any, name: str, qos: str | Qos = "services") -> Client:
-        """A client of a service."""
+    def client(
+        self, kind: Any, name: str, qos: str | Qos = "services", memory: Rules | None = None
+    ) -> Client:
+        """A client of a service; ``memory`` bounds what responses take."""
         be_service(kind)
         be_qos(qos)
         full = self._resolve(name)
@@ -256,7 +269,11 @@ class Node(context_.Node):
         made.name = full
         made.node = self
         requester = self.context.middleware.requester
-        return self._join(made, lambda: requester(self.participant, made.name, kind.TYPE, made.deliver, qos))
+
+        def make(taker: Any) -> Any:
+            return requester(self.participant, full, kind.TYPE, taker.deliver, qos)
+
+        return self._join(made, make, memory, kind.Response)
 
     def lifecycle(
         self,
@@ -269,12 +286,12 @@ class Node(context_.Node):
         services: bool = True,
         time: Callable[[], tuple[int, int]] | None = None,
     ) -> Lifecycle:
-        """Makes this a managed node; see ``muros.rclc.node.lifecycle``. Its events bear the system's time."""
+        """Makes this a managed node; see ``muros.rclc.compositions.lifecycle``. Its events bear the system's time."""
         given = (on_configure, on_activate, on_deactivate, on_cleanup, on_shutdown, on_error, time)
         for callback in given:
             if callback is not None:
                 be_callable(callback, "a callback of a lifecycle")
-        return node_.lifecycle(self, *given[:-1], services, time or host_logger.system_time)
+        return compositions.lifecycle(self, *given[:-1], services, time or host_logger.system_time)
 
     def parameters(
         self,
@@ -283,8 +300,11 @@ class Node(context_.Node):
         undeclared: bool = False,
         low_memory: bool = False,
         longest: int = 0,
+        memory: Rules | None = None,
     ) -> Parameters:
-        """The parameters of the node; see ``muros.rclc.node.parameters``. Any number, of any length, unless told else.
+        """The parameters of the node; see ``muros.rclc.compositions.parameters``.
+
+        Any number, of any length, unless told else.
 
         Raises RclError for a node that has some already.
         """
@@ -293,7 +313,7 @@ class Node(context_.Node):
         from muros.rclc.host.parameter_files import kind
         from muros.rclc.host.parameters import Parameters
 
-        options = (max, notify, undeclared, low_memory, longest, kind, time_ns)
+        options = (max, notify, undeclared, low_memory, longest, kind, time_ns, memory)
         made = self.__dict__["_parameters"] = Parameters(self, *options)
         if "_clock" in self.__dict__:
             self.clock.follow(made)
@@ -343,18 +363,21 @@ class Node(context_.Node):
         results: int = 100,
         result_timeout: float = 10.0,
         clock: Callable[[], tuple[int, int]] | None = None,
+        memory: Rules | None = None,
     ) -> ActionServer:
-        """A server of an action; see ``muros.rclc.node.action_server``. Stamps are of the computer's clock."""
+        """A server of an action; see ``muros.rclc.compositions.action_server``. Stamps are of the computer's clock."""
         from muros.rclc.host.actions import make_server
 
         functions = (on_execute, on_goal, on_cancel, on_accepted)
-        return make_server(self, kind, name, functions, (goals, results, result_timeout), clock)
+        return make_server(self, kind, name, functions, (goals, results, result_timeout), clock, memory)
 
-    def action_client(self, kind: Any, name: str, goals: int = 0) -> ActionClient:
-        """A client of an action, with at most ``goals`` on their way (0: any number)."""
+    def action_client(
+        self, kind: Any, name: str, goals: int = 0, memory: Rules | None = None
+    ) -> ActionClient:
+        """A client of an action; see ``muros.rclc.compositions.action_client``."""
         from muros.rclc.host.actions import make_client
 
-        return make_client(self, kind, name, goals)
+        return make_client(self, kind, name, goals, memory)
 
     def logger(
         self,
@@ -363,7 +386,7 @@ class Node(context_.Node):
         show: Callable[[str], object] | None = host_logger.show_on_stderr,
         services: bool = False,
     ) -> Logger:
-        """A logger to /rosout, see ``muros.rclc.node.logger``: ``level`` by name, and shown on standard error.
+        """A logger to /rosout, see ``muros.rclc.compositions.logger``: ``level`` by name, and shown on standard error.
 
         ``level`` None is what ``--log-level`` says, else "info". With ``services`` others may ask for the level and set
         it: ``~/get_logger_levels``, ``~/set_logger_levels``. Raises ValueError for a level that there is not.
@@ -397,10 +420,15 @@ class Node(context_.Node):
 
         return ExpiringService(self.context, kind, callback, qos)
 
-    def _join(self, handle: Made, make: Callable[[], Any]) -> Made:
-        """Gives a handle its entity; one that cannot be made leaves nothing behind."""
+    def _join(self, handle: Made, make: Callable[[Any], Any], memory: Rules | None, kind: Any) -> Made:
+        """Gives a handle its entity, which ``make(taker)`` makes; one that cannot be made leaves nothing behind.
+
+        ``memory`` bounds what comes, which is of ``kind``.
+        """
         try:
-            handle.entity = make()
+            if memory is not None and not hasattr(memory, "guard"):
+                raise WrongTypeError(f"memory is Rules(...), not {memory!r}")
+            handle.entity = make(handle if memory is None else memory.guard(handle, kind))
         except Exception:
             self.context.handles.remove(handle)
             raise

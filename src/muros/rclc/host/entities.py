@@ -75,6 +75,7 @@ class Service(service_.Service):
     """Made by ``Node.service``; see ``muros.rclc.service.Service``."""
 
     name = ""
+    refused = 0  # requests beyond the rules for memory
     context: Context
     session_timeout = 0.0
     """Seconds for which ``reply`` waits until an answer is confirmed; 0: it does not wait."""
@@ -109,6 +110,7 @@ class Client(client_.Client):
     """Made by ``Node.client``; see ``muros.rclc.client.Client``."""
 
     name = ""
+    refused = 0  # responses beyond the rules for memory
     context: Context
     node: Node
     session_timeout = 0.0

@@ -12,6 +12,7 @@ from muros.rclc.parameter_values import TYPES, kind_of
 
 if TYPE_CHECKING:
     from muros.rclc.host.context import Node
+    from muros.rclc.memory import Rules
 
 __all__ = ["Parameters"]
 
@@ -35,8 +36,9 @@ class Parameters(parameters.Parameters):
         longest: int,
         kind: Callable[[str], Any] = kind,
         clock: Callable[[], int] | None = None,
+        memory: Rules | None = None,
     ) -> None:
-        super().__init__(node, max, notify, undeclared, low_memory, longest, kind, clock)
+        super().__init__(node, max, notify, undeclared, low_memory, longest, kind, clock, memory)
         self.given: dict[str, Any] = dict(node.overrides)
 
     def declare(

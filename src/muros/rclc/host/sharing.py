@@ -34,6 +34,7 @@ from weakref import WeakKeyDictionary
 
 from muros.rclc.errors import RclError
 from muros.rclc.host.handles import GuardCondition, Timer
+from muros.rclc.memory import Guard
 
 if TYPE_CHECKING:
     from muros.client.qos import Qos
@@ -128,7 +129,8 @@ class Mailbox:
         self.take = take
         self.seat = seat
         """Whose it is; ``move`` gives it to another."""
-        self._handle: Any = getattr(take, "__self__", None)
+        owner: Any = getattr(take, "__self__", None)
+        self._handle: Any = owner.handle if isinstance(owner, Guard) else owner
         self._depth: int = getattr(self._handle, "depth", 0) or _DEPTH
         self._newest = not hasattr(
             self._handle, "take"
