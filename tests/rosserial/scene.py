@@ -112,14 +112,17 @@ class Scene:
         return lambda **fields: made.write(kind(**fields).serialize())
 
     def reader(self, name: str, type_name: str, depth: int = 10_000) -> Callable[[], list[Any]]:
-        """A subscriber in the graph: call it for what has come since."""
+        """A subscriber in the graph: call it for what has come since; None is what cannot be decoded."""
         made: Reader = self.other.reader(_topic(name, type_name), Qos(depth=depth))
         kind = interfaces.message(type_name)
 
         def take() -> list[Any]:
             found = []
             while (sample := made.take()) is not None:
-                found.append(kind.deserialize(sample.data))
+                try:
+                    found.append(kind.deserialize(sample.data))
+                except interfaces.CdrError:
+                    found.append(None)
             return found
 
         return take

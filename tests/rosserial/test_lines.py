@@ -158,3 +158,28 @@ def test_a_quiet_groovy_board_that_is_well_loses_nothing() -> None:
     assert max(down) <= listing + 10
     assert max(up) <= listing + 10
     assert 20 <= scene.core.boards[0].asks - asks <= (scene.now - start) / 1_500
+
+
+@pytest.mark.parametrize("period", [5, 10, 30])
+@pytest.mark.parametrize("length", [60, 200, 511])
+def test_a_damaged_length_on_a_slow_line(period: int, length: int) -> None:
+    """What it promises may never come; where the line has no pauses it is complete before long."""
+    scene = Scene(baud=57_600)
+    board = RosLib(scene)
+    chatter = board.publisher("chatter", "std_msgs/String")
+    Uart(board, 57_600)
+    board.plug()
+    scene.step(1_000)
+    hear = scene.reader("/chatter", STRING)
+    waits: list[int] = []
+    said: list[int] = []
+    for i in range(1_000):
+        if i == 200:
+            board.raw(bytes((0xFF, 0xFE, length & 255, length >> 8, ~((length & 255) + (length >> 8)) & 255)))
+        if i % period == 0:
+            board.send(chatter, string(f"{i:016}"))
+            said.append(scene.now)
+        scene.step()
+        waits += [scene.now - said[len(waits) + k] for k, _ in enumerate(hear())]
+    assert len(said) - len(waits) <= 1
+    assert min(waits) < max(waits) <= 100

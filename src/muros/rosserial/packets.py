@@ -7,9 +7,9 @@ makes the sum of what it covers and itself 255 modulo 256. Nothing is escaped, s
 How the decoder stays in step: whatever looks like a frame and proves not to be one costs its first byte only; the
 search goes on right behind it, so that a good frame is found wherever it begins, also inside a damaged one. What
 looks like a frame and is not complete yet has to be waited for, though a damaged length may announce bytes that
-never come. Such a one is given up when the line has paused, or has taken longer than it needs for so many bytes,
-*and* a whole good frame stands behind its beginning; or after a long pause in any case. And as adding up is what
-costs time, each byte received pays for a few bytes added; bytes that are made up to cost more are skipped over.
+never come. Such a one is given up when the line has paused since it began, in all longer than a sender would within
+a frame, *and* a whole good frame stands behind its beginning; or after a long pause in any case. And as adding up is
+what costs time, each byte received pays for a few bytes added; bytes that are made up to cost more are skipped over.
 """
 
 from muros.compat import MPY, const, copy, ticks_diff
@@ -121,6 +121,7 @@ class Decoder:
         self._buf = bytearray(capacity + _OVERHEAD)
         self._end = 0
         self._since = 0
+        self._had = 0
         self._last = 0
         self._need = 0
         self._credit = 0
@@ -141,6 +142,7 @@ class Decoder:
             end = self._end
             if end == 0:
                 self._since = now
+                self._had = 0
             take = min(n - at, room - end)
             copy(buf, end, data, at, take)
             at += take
@@ -150,10 +152,8 @@ class Decoder:
         """Gives up what will never be complete; returns in how many ms to call again, -1: when more bytes came."""
         while self._end:
             quiet = ticks_diff(now, self._last)
-            due = min(
-                _PAUSE - quiet,
-                _PAUSE + self._need * self.byte_us // 1000 - ticks_diff(now, self._since),
-            )
+            busy = (self._end - self._had) * self.byte_us // 1000
+            due = _PAUSE - max(quiet, ticks_diff(now, self._since) - busy)
             if quiet >= _SILENCE or (due <= 0 and self._another()):
                 self.cut += 1
                 self.garbage += 1
@@ -173,6 +173,7 @@ class Decoder:
             if rest:
                 self._buf[:rest] = self._buf[off:end]
             self._since = now
+            self._had = rest
         self._end = rest
 
     def _scan(self, off: int, end: int) -> int:

@@ -11,7 +11,8 @@ and no sign of a restart. So the server goes by these:
   which version it speaks. While a board shows no sign it gets them twice a second, and a request for the time that
   is not due means that it has started again.
 - A frame of an unknown topic means that something was lost, or that the board has started again with other topics.
-- Topics that stay unnamed after two requests are gone; damage on the line while they are named brings another request.
+- Topics that stay unnamed after two requests are gone. Damage on the line while they are named brings other requests,
+  and then one that was named after any of them is there.
 
 What a request names again stays as it is: nobody in the graph sees a board's restart.
 """
@@ -114,6 +115,8 @@ _CHECK_AFTER = 700
 """Silence before checks begin, in ms."""
 _TRIES = 3
 """Unanswered topic requests in the version that was heard until both are tried again; also requests after damage."""
+_MOST_TRIES = 12
+"""Requests, at last one a second, until what was not named on a line with damage counts as gone."""
 _LAST_HALF = ID_SERVICE_CLIENT + 1
 """Up to this id a frame names a topic or a half of a service."""
 _MISSES = 2
@@ -164,6 +167,8 @@ class Board:
         self._now = 0
         self.round = 0
         """The number of the last topic request."""
+        self.first_round = 0
+        """The number of the first one that was made for the same reason."""
         self._incoming = self.roster.incoming
         self._open_asks: list[int] = []
         self._asked_at = 0
@@ -324,7 +329,7 @@ class Board:
         if self._settle_at is not None and now >= self._settle_at:
             self._settled(now)
         elif self._repeats() and now >= self._asked_at + limits.ask:
-            self._ask(now)
+            self._ask(now, again=True)
         if self.last_time is None:
             return  # it never asks for the time: its silence means nothing
         silence = now - self.connected_at
@@ -362,13 +367,16 @@ class Board:
 
     # Negotiation
 
-    def _ask(self, now: int) -> None:
-        """Asks for topics; in both versions while it is not known which one is understood."""
+    def _ask(self, now: int, again: bool = False) -> None:
+        """Asks for topics, for a new reason or once more; in both versions while none was understood."""
         self._open_asks = [at for at in self._open_asks if now - at < _OPEN]
         if self.version and len(self._open_asks) >= _TRIES - 1:
             self.decoder.version = ANY_VERSION
         both = self.decoder.version == ANY_VERSION
         self.round += 1
+        if not again:
+            self._misses = 0
+            self.first_round = self.round
         self.asks += 1
         self._asked_at = now
         self._open_asks.append(now)
@@ -415,9 +423,14 @@ class Board:
             self._be_sure()
         missing = self.roster.missing()
         damaged = self.suspicions.damage != self._damage
-        if (missing or damaged or self.roster.halved()) and self._misses < (_TRIES if damaged else _MISSES):
+        unsure = missing or self.roster.halved()
+        most = _MISSES if not damaged else _MOST_TRIES if unsure else _TRIES
+        if (unsure or damaged) and self._misses < most:
+            if self._misses >= _TRIES and now < self._asked_at + self.core.limits.ask:
+                self._settle_at = self._asked_at + self.core.limits.ask
+                return
             self._misses += 1
-            self._ask(now)
+            self._ask(now, again=True)
             return
         self._misses = 0
         self._open_asks.clear()
@@ -604,5 +617,5 @@ class Board:
                 remedy="Nothing: the board is asked again",
             )
         if now >= self._asked_at + self.core.limits.ask:
-            self._ask(now)
+            self._ask(now, again=self._settle_at is not None)
             self._plan(now)

@@ -71,8 +71,8 @@ class Roster:
             self._set_up(self._key(branch, infos), infos)
 
     def missing(self) -> list[Endpoint]:
-        """What was not named after the last topic request."""
-        return [each for each in self.endpoints.values() if each.round != self.board.round]
+        """What was not named after the last topic request, or those made again because of damage."""
+        return [each for each in self.endpoints.values() if each.round < self.board.first_round]
 
     def lacks(self, tell: bool) -> bool:
         """Whether the board has not named all of ``~require/publishers`` and ``~require/subscribers``; says which.
@@ -100,7 +100,8 @@ class Roster:
 
     def halved(self) -> bool:
         """Whether only one half of some service was named."""
-        return any(len(found) < 2 for _, found in self._halves.values())
+        first = self.board.first_round
+        return any(len(found) < 2 for asked, found in self._halves.values() if asked >= first)
 
     def count(self, kind: type[Endpoint]) -> int:
         """How many there are of a kind."""
@@ -162,10 +163,10 @@ class Roster:
         return name if name.startswith("/") else f"{node.rpartition('/')[0]}/{name}"
 
     def _other_half(self, branch: int, half: int, info: TopicInfo) -> tuple[TopicInfo, TopicInfo] | None:
-        """Both halves of a service, None until both were named after one request."""
+        """Both halves of a service, None until both were named."""
         name = (branch, info.topic_name)
         asked, halves = self._halves.get(name, (self.board.round, {}))
-        if asked != self.board.round:
+        if asked < self.board.first_round:
             halves = {}
         if name not in self._halves and len(self._halves) >= self._most:
             self._too_many()
