@@ -183,3 +183,55 @@ def test_a_damaged_length_on_a_slow_line(period: int, length: int) -> None:
         waits += [scene.now - said[len(waits) + k] for k, _ in enumerate(hear())]
     assert len(said) - len(waits) <= 1
     assert min(waits) < max(waits) <= 100
+
+
+def errors_of_clocks(baud: int, waits: bool, seconds: int = 40) -> list[float]:
+    """How far a board's clock is ahead after each answer, in ms, while its line to the board is always full.
+
+    ``waits``: it writes without a buffer, so that its request has left when it looks at its clock.
+    """
+    scene = Scene(baud=baud)
+    board = RosLib(scene)
+    board.subscriber("led_out", "std_msgs/Byte")
+    line = Uart(board, baud)
+    board.plug()
+    write = scene.writer("/led_out", BYTE)
+    errors = []
+    for _ in range(1_000 * seconds):
+        write(data=0)
+        board.clock, asked = None, board.asked_time
+        scene.step()
+        if waits and board.asked_time > asked:
+            board._synced_at += round(16 * line.byte_us / 1000)
+        if board.clock is not None:
+            errors.append((board.clock - scene.wall()) / 1e6)
+    assert len(errors) >= seconds // 3
+    return errors
+
+
+@pytest.mark.parametrize("baud", [9_600, 57_600, 115_200, 1_000_000])
+def test_clocks_of_boards_are_right_on_slow_and_busy_lines(baud: int) -> None:
+    """A board's clock has steps of 1 ms. One that writes without a buffer is behind by its request's time on the line."""
+    assert max(map(abs, errors_of_clocks(baud, waits=False))) <= 1.0
+    request = 160e3 / baud
+    behind = errors_of_clocks(baud, waits=True)
+    assert -request - 1.5 <= min(behind) <= max(behind) <= 1.0
+
+
+def test_an_answer_that_waits_has_the_time_when_it_leaves() -> None:
+    """Clocks are set: an answer that was ready before has the time of after that."""
+    scene = Scene()
+    board = RosLib(scene)
+    board.plug()
+    scene.step(1_000)
+    scene.link.waiting = 1
+    board._ask_time()
+    scene.step(30)
+    ahead = 3_600 * 10**9
+    wall = scene.wall
+    scene.world.time = lambda: wall() + ahead
+    scene.link.waiting = 0
+    board.clock = None
+    scene.until(lambda: board.clock, within=100)
+    assert board.clock is not None
+    assert abs(board.clock - wall() - ahead) <= 1_000_000

@@ -43,9 +43,9 @@ from muros.rosserial.messages import (
     log_untrusted,
     parameter_request_untrusted,
     topic_info_untrusted,
-    write_time,
 )
 from muros.rosserial.packets import ANY_VERSION, Decoder, frame
+from muros.rosserial.server._answers import parameter_answer, time_answer
 from muros.rosserial.server._diagnosis import Suspicions
 from muros.rosserial.server._door import Node, RefusedError
 from muros.rosserial.server._endpoints import (
@@ -55,7 +55,6 @@ from muros.rosserial.server._endpoints import (
     Subscription,
 )
 from muros.rosserial.server._output import Link, Output
-from muros.rosserial.server._parameters import answer_of, plain_name
 from muros.rosserial.server._roster import Roster
 from muros.rosserial.server.events import (
     BoardBack,
@@ -122,7 +121,6 @@ _LAST_HALF = ID_SERVICE_CLIENT + 1
 _MISSES = 2
 _BITS = 10
 """Bits of a byte on a serial line, start and stop bit included."""
-_TIME_BYTES = 16
 
 
 class Board:
@@ -399,9 +397,9 @@ class Board:
         if self.state != SYNCED:
             self._heard_again(now)
             self._step(ANSWER)
-        self._meet()
+        self.meet()
 
-    def _meet(self) -> None:
+    def meet(self) -> None:
         """It is a board: it becomes a node, if it is none yet."""
         if self.node is None:
             try:
@@ -528,15 +526,8 @@ class Board:
         return True
 
     def _time(self, now: int) -> None:
-        """Answers with the time at which the request left the board, as the board adds the whole round trip to it."""
-        arrived = (self.node or self.core.world).time()
-        if self.node is None:
-            self._meet()  # that takes a while, so time went on meanwhile, unless it is simulated
-            arrived = min(arrived, (self.node or self.core.world).time())
-        stamp = max(0, arrived - round(_TIME_BYTES * self.output.byte_us * 1000))
-        body = bytearray(8)
-        write_time(body, 0, stamp // 1_000_000_000 & 0xFFFFFFFF, stamp % 1_000_000_000)
-        self.output.post(frame(ID_TIME, body, self.version))
+        """A board that asks for the time is connected, or shows that it is not when it asks too early."""
+        self.output.post(time_answer(self, now))
         self.pump(now)
         last, self.last_time, self.connected_at = self.last_time, now, now
         early = last is not None and now - last < _TIME_PERIOD and self._settle_at is None
@@ -576,33 +567,13 @@ class Board:
 
     def _log(self, level: int, text: str) -> None:
         self.core.tell(BoardLog(self.label, level, text))
-        self._meet()
+        self.meet()
         if self.node is not None:
             self.node.log(level, text)
 
     def _parameter(self, name: str) -> None:
-        """Answers always, also unconnected boards: without an answer their loops stand still for a second."""
-        self._meet()
-        value = self.node.parameter(name) if self.node is not None else None
-        if value is None:
-            self.report(
-                "no-such-parameter",
-                subject=name,
-                what=f"{self.who} asks for the parameter {name}",
-                why="it is not set",
-                remedy=f"Set it: muros param set {self.node_name} {plain_name(name, self.node_name)} VALUE",
-            )
-        room = self.input_buffer or self.core.limits.input_buffer
-        body, fits = answer_of(value, room)
-        if not fits:
-            self.report(
-                "too-long-for-board",
-                subject=name,
-                what=f"the parameter {name} is not given to {self.who}",
-                why=f"it does not fit the board's input buffer of {room} B, or is no value that a board can have",
-                remedy="Use numbers, texts or lists of one of them, short enough for INPUT_SIZE",
-            )
-        self.output.post(frame(ID_PARAMETER_REQUEST, body, self.version))
+        self.meet()
+        self.output.post(parameter_answer(self, name))
         self.pump(self._now)
 
     def _strange(self, topic_id: int, now: int) -> None:

@@ -6,7 +6,7 @@ messages in their readers, where newer ones replace older ones.
 """
 
 from collections import deque
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from typing import Any, Protocol
 
 __all__ = ["Link", "Output", "Source"]
@@ -57,12 +57,12 @@ class Output:
         """Whether topics have to wait: the board is not in sync."""
         self._lead_us = 1000 * lead
         self._room = room
-        self._urgent: deque[bytes] = deque()
+        self._urgent: deque[bytes | Callable[[int], bytes]] = deque()
         self._ready: deque[Source] = deque()
         self._free_us = 0.0
 
-    def post(self, frame: bytes) -> bool:
-        """Has a frame sent before all topics; False if too many wait."""
+    def post(self, frame: bytes | Callable[[int], bytes]) -> bool:
+        """Has a frame sent before all topics, one made by ``frame(now)`` when its turn has come; False if many wait."""
         if len(self._urgent) >= self._room:
             self.dropped += 1
             return False
@@ -110,8 +110,10 @@ class Output:
         n = 0
         free_us = max(self._free_us, now_us)
         while n < _BATCH and free_us + n * self.byte_us <= now_us + self._lead_us:
+            frame: bytes | None
             if urgent:
-                frame: bytes | None = urgent.popleft()
+                first = urgent.popleft()
+                frame = first if isinstance(first, bytes) else first(now)
             elif ready and not self.holds:
                 source = ready.popleft()
                 frame = source.next(now)
