@@ -196,7 +196,7 @@ def errors_of_clocks(baud: int, waits: bool, seconds: int = 40) -> list[float]:
     line = Uart(board, baud)
     board.plug()
     write = scene.writer("/led_out", BYTE)
-    errors = []
+    errors: list[float] = []
     for _ in range(1_000 * seconds):
         write(data=0)
         board.clock, asked = None, board.asked_time
@@ -211,7 +211,7 @@ def errors_of_clocks(baud: int, waits: bool, seconds: int = 40) -> list[float]:
 
 @pytest.mark.parametrize("baud", [9_600, 57_600, 115_200, 1_000_000])
 def test_clocks_of_boards_are_right_on_slow_and_busy_lines(baud: int) -> None:
-    """A board's clock has steps of 1 ms. One that writes without a buffer is behind by its request's time on the line."""
+    """The clocks have steps of 1 ms. A board that writes without a buffer is behind by its request on the line."""
     assert max(map(abs, errors_of_clocks(baud, waits=False))) <= 1.0
     request = 160e3 / baud
     behind = errors_of_clocks(baud, waits=True)
