@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -73,7 +74,7 @@ class Objects:
     def type_name(self, interface: Any) -> str:
         return str(interface.__name__)
 
-    def offer(self, interface: Any, target: object) -> Offered:
+    def offer(self, interface: Any, target: object, on_error: Callable[[str, Exception], object]) -> Offered:
         for operation in interface.operations if interface else ():
             if not hasattr(target, operation):
                 raise RtcError(f"{type(target).__name__} has no method {operation}")

@@ -5,6 +5,7 @@ The room that does (`muros.rtc.corba`) registers itself with `use_service_object
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -51,10 +52,13 @@ class ServiceObjects(Protocol):
     def type_name(self, interface: Any) -> str:
         """Its name without the modules it stands in: `MyService`."""
 
-    def offer(self, interface: Any, target: object) -> OfferedObject:
+    def offer(
+        self, interface: Any, target: object, on_error: Callable[[str, Exception], object]
+    ) -> OfferedObject:
         """An object whose operations are the methods of `target`, or `target` itself where it is a servant.
 
-        `interface` is not needed for a servant (None). RtcError where an operation is missing.
+        `interface` is not needed for a servant (None). RtcError where an operation is missing. `on_error` is told
+        the operation that raised what its interface does not declare, and what that was.
         """
 
     def resolve(self, reference: str, interface: Any) -> Any:

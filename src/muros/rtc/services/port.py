@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from muros.findings import Finding
+from muros.findings import Finding, Severity
 from muros.rtc.codes import Polarity, PortType, ReturnCode, RtcError
 from muros.rtc.ports import Port, PortOwner
 from muros.rtc.profiles import ConnectorProfile, InterfaceProfile
@@ -67,7 +67,7 @@ class ServicePort(Port):
         names are taken, or an operation is missing.
         """
         key = self._new_key(instance_name, type_name)
-        offered = self._space().offer(interface, target)
+        offered = self._space().offer(interface, target, self._operation_failed)
         self._providers = {**self._providers, key: _Provider(target, offered)}
         if self._active:
             offered.activate()
@@ -149,6 +149,15 @@ class ServicePort(Port):
                 "the provider's key",
             )
         return served
+
+    def _operation_failed(self, operation: str, error: Exception) -> None:
+        self._tell(
+            "service-failed",
+            f"operation {operation} raised",
+            f"{type(error).__name__}: {error}",
+            "The caller was told CORBA.UNKNOWN. Let the operation raise what its interface declares.",
+            Severity.ERROR,
+        )
 
     def _space(self) -> ServiceObjects:
         return self._objects if self._objects is not None else service_objects()
