@@ -222,7 +222,7 @@ def test_who_waits_in_vain_for_an_agent_without_a_graph_is_told() -> None:
     assert not alice.node.graph.wait_for_node("/nobody", timeout=0.5)
     assert not alice.node.client(AddTwoInts, "add").wait_for_service(timeout=0.5)
     assert not alice.node.graph.known
-    assert [code for code, _ in problems] == [17], "once"
+    assert [code for code, _ in problems] == [22], "once"
     assert "a plain DDS-XRCE agent does not" in problems[0][1]
 
 

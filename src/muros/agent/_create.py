@@ -1,5 +1,7 @@
 """From what a client describes to a proxy in the data space: parents, topics and QoS are resolved here."""
 
+from muros.agent._events_proxy import TOPIC as EVENTS
+from muros.agent._events_proxy import EventsProxy, subject
 from muros.agent._limits import Limits
 from muros.agent._proxies import (
     GroupProxy,
@@ -148,6 +150,8 @@ def build(
             return WriterProxy(object_id, entity, participant, topic, _qos(entity, parent))
         if isinstance(entity, DataReaderEntity):
             topic = _topic(entity, participant, objects)
+            if topic.name.startswith(EVENTS):
+                return _events(entity, object_id, participant, topic, objects, space)
             return ReaderProxy(object_id, entity, participant, topic, _qos(entity, parent))
         if isinstance(entity, RequesterEntity):
             return RequesterProxy(
@@ -185,6 +189,24 @@ def _participant(
     except ValueError:  # the old one of this id lives on for its endpoints
         participant = space.participant(node, **options)  # type: ignore[arg-type]
     return ParticipantProxy(object_id, entity, participant, domain, name)
+
+
+def _events(
+    entity: DataReaderEntity,
+    object_id: int,
+    participant: ParticipantProxy,
+    topic: Topic,
+    objects: dict[int, Proxy],
+    space: Space,
+) -> EventsProxy:
+    of = subject(topic.name, objects)
+    if of is None or of.parent is None or of.parent.domain != participant.domain:
+        raise Refused(
+            STATUS_ERR_UNKNOWN_REFERENCE,
+            f"{topic.name!r} names no writer or reader of this client",
+            "Create it first.",
+        )
+    return EventsProxy(object_id, entity, participant, topic, of, objects, space)
 
 
 def _domain(asked: int | None, entity: ParticipantEntity, default_domain: int) -> int:

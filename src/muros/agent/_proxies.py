@@ -28,6 +28,7 @@ __all__ = [
     "GroupProxy",
     "ParticipantProxy",
     "Proxy",
+    "Readable",
     "ReaderProxy",
     "Reading",
     "ReplierProxy",
@@ -276,7 +277,7 @@ class Reading:
             self._waking = self._host.wait_until(tick, self)
 
 
-class _Readable(Proxy):
+class Readable(Proxy):
     """A proxy that can be read: it runs at most one reading."""
 
     __slots__ = ("reading", "topic")
@@ -313,7 +314,7 @@ class _Readable(Proxy):
             self.reading.pump()
 
 
-class ReaderProxy(_Readable):
+class ReaderProxy(Readable):
     """A datareader."""
 
     __slots__ = ("reader",)
@@ -340,7 +341,7 @@ class ReaderProxy(_Readable):
         super().close()
 
 
-class RequesterProxy(_Readable):
+class RequesterProxy(Readable):
     """A client of a service: its requests carry the ids of their WRITE_DATA, which the replies bring back."""
 
     __slots__ = ("_answered", "_limit", "_outstanding", "_sending", "requester")
@@ -399,7 +400,7 @@ class RequesterProxy(_Readable):
         super().close()
 
 
-class ReplierProxy(_Readable):
+class ReplierProxy(Readable):
     """A service: requests go to the client behind the sample identity that its reply brings back."""
 
     __slots__ = ("replier",)

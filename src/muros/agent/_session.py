@@ -13,11 +13,11 @@ from muros.agent._messages import InvalidMessage, parse_read_data_untrusted, sta
 from muros.agent._proxies import (
     ParticipantProxy,
     Proxy,
+    Readable,
     Reading,
     ReplierProxy,
     RequesterProxy,
     WriterProxy,
-    _Readable,
 )
 from muros.agent.events import EntityCreated, EntityDeleted, client_name
 from muros.xrce import beginning, inputs, resetting
@@ -284,7 +284,7 @@ class AgentSession(SessionCore):
 
     def _pump_all(self) -> None:
         for proxy in list(self.objects.values()):
-            if isinstance(proxy, _Readable) and proxy.reading is not None:
+            if isinstance(proxy, Readable) and proxy.reading is not None:
                 proxy.reading.pump()
 
     # Submessages
@@ -434,7 +434,7 @@ class AgentSession(SessionCore):
             return self._malformed("READ_DATA", "it is cut short")
         ids = bytes(buf[off : off + 4])
         proxy = self.objects.get(ids[2] << 8 | ids[3])
-        if not isinstance(proxy, _Readable):
+        if not isinstance(proxy, Readable):
             self._status(ids, STATUS_ERR_UNKNOWN_REFERENCE, STREAM_RELIABLE)
             return HANDLED
         try:

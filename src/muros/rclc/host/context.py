@@ -322,9 +322,9 @@ class Node(context_.Node):
     def on_events(self, entity: Publisher | Subscription, **callbacks: Callable[[Event], object]) -> Events:
         """Has an executor call ``callback(event)`` when something becomes of a publisher or subscription of ours.
 
-        ``deadline_missed``, ``message_lost``, and straight in a data space ``matched``, ``incompatible_qos`` and
-        ``liveliness_lost``, of which an agent does not tell (RclError with code 3, unsupported). ``destroy()`` of the
-        handle ends it.
+        ``deadline_missed``, ``message_lost``, and straight in a data space or through the agent of muros ``matched``,
+        ``incompatible_qos`` and ``liveliness_lost``; that another agent does not tell of those is a problem that is
+        told. ``destroy()`` of the handle ends it.
         """
         from muros.rclc.host.events import make
 

@@ -2,30 +2,29 @@
 
     node.on_events(subscription, deadline_missed=lambda event: print(event.total), matched=print)
 
-Straight in a data space the space tells. Through an agent only deadlines and lost messages are known, for they are
-counted here: an agent does not tell its clients whom it has matched.
+Straight in a data space the space tells. Through an agent deadlines and lost messages are counted here; whom a
+publisher or subscription has met is told by the agent of muros, see ``agent_events``, and by no other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from muros.rclc import handles
-from muros.rclc.errors import RclError
 from muros.rclc.executor import _NEVER, Handle
 from muros.rclc.host.checks import WrongTypeError, be_callable
 from muros.rclc.host.entities import Publisher
 from muros.rclc.subscription import Subscription
 
 if TYPE_CHECKING:
+    from muros.rclc.host.agent_events import News, NewsReader
     from muros.rclc.host.context import Node
     from muros.xrce._types import Buffer
 
 __all__ = ["Event", "EventSource", "Events", "SessionEvents", "make"]
 
-_UNSUPPORTED = 3
 DEADLINE_MISSED, INCOMPATIBLE_QOS, LIVELINESS_LOST, MATCHED, MESSAGE_LOST = NAMES = (
     "deadline_missed",
     "incompatible_qos",
@@ -33,6 +32,8 @@ DEADLINE_MISSED, INCOMPATIBLE_QOS, LIVELINESS_LOST, MATCHED, MESSAGE_LOST = NAME
     "matched",
     "message_lost",
 )
+_TOLD = frozenset({INCOMPATIBLE_QOS, LIVELINESS_LOST, MATCHED})
+"""What only an agent knows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +54,6 @@ class Event:
 
 class EventSource(Protocol):
     """Who counts what happens to one entity."""
-
-    names: tuple[str, ...]
-    """What it counts."""
 
     def count(self, name: str, now: int) -> int:
         """How many there were until now."""
@@ -100,9 +98,11 @@ class Events(Handle):
                 total = self._source.count(name, now)
                 change = total - self._told[name]
                 self._told[name] = total
-                self._present = self._source.current()
+                current = 0
+                if name == MATCHED:
+                    current = self._present = self._source.current()
                 why = self._source.why() if name == INCOMPATIBLE_QOS else ""
-                callback(Event(name, total, change, self._present if name == MATCHED else 0, why))
+                callback(Event(name, total, change, current, why))
 
     def left(self, now: int) -> int:
         """Milliseconds until something may be told without a message."""
@@ -120,14 +120,17 @@ class Events(Handle):
 
 
 class SessionEvents:
-    """Counts what is known of an entity at an agent: its deadline, and what was lost here."""
+    """Counts what becomes of an entity at an agent: its deadline, what was lost here, and what the agent tells."""
 
-    names: tuple[str, ...] = (DEADLINE_MISSED, MESSAGE_LOST)
-
-    def __init__(self, owner: Any, entity: Any, clock: Callable[[], int]) -> None:
+    def __init__(self, node: Node, owner: Any, entity: Any, names: Iterable[str]) -> None:
         self._owner = owner
         self._period: int = entity.qos.deadline
-        self._clock = clock
+        self._clock = node.context.clock
+        self._news: NewsReader | None = None
+        if _TOLD.intersection(names):
+            from muros.rclc.host.agent_events import NewsReader
+
+            self._news = NewsReader(node.context, node.participant, entity)
         self._missed = 0
         self._base: int | None = None  # the tick of the last message, or of the last period that was missed
         self._entity = entity
@@ -142,26 +145,38 @@ class SessionEvents:
         """How many there were until now."""
         if name == MESSAGE_LOST:
             return int(getattr(self._owner, "lost", 0))
-        self._look(now)
-        return self._missed
+        if name == DEADLINE_MISSED:
+            self._look(now)
+            return self._missed
+        news = self._told(now)
+        return (
+            news.matched if name == MATCHED else news.misfits if name == INCOMPATIBLE_QOS else news.silences
+        )
 
     def current(self) -> int:
-        """Nobody knows."""
-        return 0
+        """How many are matched now, as far as the agent tells."""
+        return self._told(self._clock()).current
 
     def why(self) -> str:
-        """Nobody knows."""
-        return ""
+        """What did not fit last."""
+        return self._told(self._clock()).why
 
     def left(self, now: int) -> int:
-        """Milliseconds until the deadline."""
+        """Milliseconds until the deadline, or until an agent has been silent for too long."""
+        left = _NEVER if self._news is None else self._news.left(now)
         if self._base is None or not self._period:
-            return _NEVER
-        return max(self._base + self._period - now, 0)
+            return left
+        return min(left, max(self._base + self._period - now, 0))
 
     def close(self) -> None:
         """Counts no more."""
         self._period = 0
+        if self._news is not None:
+            self._news.close()
+
+    def _told(self, now: int) -> News:
+        assert self._news is not None
+        return self._news.look(now)
 
     def _take(self, buf: Buffer, off: int, n: int) -> None:
         self._touch()
@@ -201,15 +216,7 @@ def make(node: Node, owner: Any, callbacks: dict[str, Callable[[Event], object]]
     open_source = getattr(node.context.middleware, "event_source", None)
     source: EventSource
     if open_source is None:
-        source = SessionEvents(owner, entity, node.context.clock)
+        source = SessionEvents(node, owner, entity, callbacks)
     else:
         source = open_source(owner, entity)
-    for name in callbacks:
-        if name not in source.names:
-            source.close()
-            error = RclError(
-                f"an agent does not tell of {name}: only {' and '.join(source.names)} are known here"
-            )
-            error.code = _UNSUPPORTED
-            raise error
     return Events(node, source, callbacks)
