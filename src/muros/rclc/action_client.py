@@ -102,7 +102,8 @@ class ActionClient(Handle):
         """
         if self.capacity and len(self.goals) >= self.capacity:
             borrow("muros.rclc.actions").full(self)
-        made = SentGoal(self, borrow("muros.rclc.actions").new_id(), on_response, on_feedback, on_result)
+        identity = borrow("muros.rclc.actions").new_id(self.context.middleware)
+        made = SentGoal(self, identity, on_response, on_feedback, on_result)
         request = self.kind.SendGoal.Request()
         request.goal_id.uuid = made.id
         request.goal = goal

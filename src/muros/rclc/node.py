@@ -58,11 +58,10 @@ def subscription(
     """
     from muros.rclc.subscription import Subscription
 
-    made = Subscription(self.context, kind, callback)
-    # A session calls its ``deliver``, which saves the heap a bound method.
-    taker: "Any" = memory.guard(made, kind) if memory else made
-    made.entity = self.context.middleware.reader(self.participant, self._topic(topic), kind.TYPE, qos, taker)
-    self.entities.append(made)
+    def enter(taker: "Any") -> "Any":  # a session calls its ``deliver``, which saves the heap a bound method
+        return self.context.middleware.reader(self.participant, self._topic(topic), kind.TYPE, qos, taker)
+
+    made: "Subscription" = _join(self, Subscription(self.context, kind, callback), enter, memory, kind)
     return made
 
 
@@ -89,12 +88,12 @@ def service(
     """
     from muros.rclc.service import Service
 
-    made = Service(self.context, kind, callback)
-    taker: "Any" = memory.guard(made, kind.Request) if memory else made
-    made.entity = self.context.middleware.replier(
-        self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
-    )
-    self.entities.append(made)
+    def enter(taker: "Any") -> "Any":
+        return self.context.middleware.replier(
+            self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
+        )
+
+    made: "Service" = _join(self, Service(self.context, kind, callback), enter, memory, kind.Request)
     return made
 
 
@@ -104,12 +103,12 @@ def client(
     """A client of a service; ``memory`` bounds what responses take."""
     from muros.rclc.client import Client
 
-    made = Client(self.context, kind)
-    taker: "Any" = memory.guard(made, kind.Response) if memory else made
-    made.entity = self.context.middleware.requester(
-        self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
-    )
-    self.entities.append(made)
+    def enter(taker: "Any") -> "Any":
+        return self.context.middleware.requester(
+            self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
+        )
+
+    made: "Client" = _join(self, Client(self.context, kind), enter, memory, kind.Response)
     return made
 
 
@@ -124,6 +123,19 @@ def destroy(self: "Node") -> None:
 
 def __getattr__(name: str) -> "Any":
     return getattr(borrow("muros.rclc.compositions"), name)
+
+
+def _join(
+    self: "Node", made: "Any", enter: "Callable[[Any], Any]", memory: "Rules | None", kind: "Any"
+) -> "Any":
+    """Has the middleware make what stands behind a handle; where it cannot, the handle is gone, too."""
+    try:
+        made.entity = enter(memory.guard(made, kind) if memory else made)
+    except Exception:
+        made.destroy()
+        raise
+    self.entities.append(made)
+    return made
 
 
 def _topic(self: "Node", name: str) -> str:

@@ -10,6 +10,9 @@ if TYPE_CHECKING:
     from typing import Any
 
 _ALWAYS = const(1)
+_LET = const(1)
+_RCLCPP = const(0)
+_GO_ON = const(1)
 _LOW_PRIORITY = const(5)
 _MESSAGES = const(10)
 
@@ -21,8 +24,10 @@ def begin(executor: "Any", options: "dict[str, Any]") -> None:
     overrun = options.pop("overrun", 1)
     messages = options.pop("messages", _MESSAGES)
     executor.on_error = options.pop("on_error", None)
-    if options or overrun == _LOW_PRIORITY:
-        raise ValueError("no board has executors with %s" % (", ".join(options) or "LOW_PRIORITY"))
+    if semantics not in (_RCLCPP, _LET):
+        raise ValueError("semantics is %r: it must be RCLCPP or LET" % semantics)
+    if options or not _GO_ON <= overrun < _LOW_PRIORITY:
+        raise ValueError("no board has executors with %s" % (", ".join(options) or "overrun=%r" % overrun))
     if semantics:
         from muros.rclc.let import Let, attach
         from muros.rclc.let_outputs import Outputs
