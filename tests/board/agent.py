@@ -74,29 +74,29 @@ class Agent:
         """Takes the submessages of a message."""
         at = 4
         while len(message) - at >= 4:
-            kind = message[at]
-            n = message[at + 2] | message[at + 3] << 8
-            body = message[at + 4 : at + 4 + n]
-            if kind == _CREATE_CLIENT:
-                self.hellos += 1
-                self.knows = 1
-                self._next = self._expected = 0
-                self.inbox.append(b"\x81\x00\x00\x00\x04\x01\x0b\x00\x00\x00XRCE\x01\x00\x01\x0f\x00")
-            elif kind == _CREATE or kind == _DELETE:
-                status = b"\x05\x01\x06\x00" + body[:4] + b"\x00\x00"
-                if body[2] == 0xFF:
-                    self.answer(status)
-                else:
-                    self.reliable(status)
-            elif kind == _GET_INFO:
-                self.answer(b"\x06\x01\x08\x00" + body[:4] + bytes((0, self.knows, 0, 0)))
-            elif kind == _WRITE_DATA:
-                self.written.append(body[4:])
-            elif kind == _HEARTBEAT:
-                self.answer(
-                    b"\x0a\x01\x05\x00" + bytes((self._expected & 255, self._expected >> 8, 0, 0, 0x80))
-                )
+            n = message[at + 2] | message[at + 3] << 8 or len(message) - at - 4
+            self.take(message[at], message[at + 1], message[at + 4 : at + 4 + n])
             at += 4 + n + 3 & ~3
+
+    def take(self, kind: int, flags: int, body: bytes) -> None:
+        """Takes a submessage."""
+        if kind == _CREATE_CLIENT:
+            self.hellos += 1
+            self.knows = 1
+            self._next = self._expected = 0
+            self.inbox.append(b"\x81\x00\x00\x00\x04\x01\x0b\x00\x00\x00XRCE\x01\x00\x01\x0f\x00")
+        elif kind == _CREATE or kind == _DELETE:
+            status = b"\x05\x01\x06\x00" + body[:4] + b"\x00\x00"
+            if body[2] == 0xFF:
+                self.answer(status)
+            else:
+                self.reliable(status)
+        elif kind == _GET_INFO:
+            self.answer(b"\x06\x01\x08\x00" + body[:4] + bytes((0, self.knows, 0, 0)))
+        elif kind == _WRITE_DATA:
+            self.written.append(body[4:])
+        elif kind == _HEARTBEAT:
+            self.answer(b"\x0a\x01\x05\x00" + bytes((self._expected & 255, self._expected >> 8, 0, 0, 0x80)))
 
     def answer(self, submessage: bytes) -> None:
         """Says something on stream 0."""

@@ -9,23 +9,51 @@ from pathlib import Path
 
 import pytest
 
+from muros.interfaces import board
 from tests.micropython.gauge import run_gauge
 from tests.micropython.runtimes import ROOT, BoardError, require
 from tests.micropython.tree import Tree, board_tree
-from tests.micropython.unix import run_mpy
+from tests.micropython.unix import LIBRARY, run_mpy
 
 _FOLDER = ROOT / "tests" / "board"
 _FILES = sorted(_FOLDER.glob("test_*.py"))
+TYPES = (
+    "std_msgs/msg/Int32",
+    "std_msgs/msg/String",
+    "std_msgs/msg/Empty",
+    "example_interfaces/srv/AddTwoInts",
+    "example_interfaces/action/Fibonacci",
+    *(f"rcl_interfaces/srv/{name}Parameters" for name in ("Get", "Set", "List", "Describe")),
+    "rcl_interfaces/srv/GetParameterTypes",
+    "rcl_interfaces/srv/SetParametersAtomically",
+    "rcl_interfaces/msg/ParameterEvent",
+    *(f"lifecycle_msgs/srv/{name}" for name in ("ChangeState", "GetState")),
+    *(f"lifecycle_msgs/srv/GetAvailable{name}" for name in ("States", "Transitions")),
+    "lifecycle_msgs/msg/TransitionEvent",
+    "micro_ros_diagnostic_msgs/msg/MicroROSDiagnosticStatus",
+)
+"""What programs on boards would have copied beside muros."""
+
+
+@pytest.fixture(scope="module")
+def messages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the message classes of boards."""
+    folder = tmp_path_factory.mktemp("messages")
+    board.generate(TYPES, folder, action_services=True, constants=())
+    return folder
 
 
 @pytest.mark.parametrize("runtime", ["unix", "gauge"])
 @pytest.mark.parametrize("path", _FILES, ids=[path.stem for path in _FILES])
-def test_on_board(path: Path, runtime: str, subtests: pytest.Subtests) -> None:
+def test_on_board(path: Path, runtime: str, messages: Path, subtests: pytest.Subtests) -> None:
     if runtime in _not_on(path):
         pytest.skip(f"{path.name} says that it cannot run on {runtime}")
     require(runtime)
     program = f"from tests.board.harness import run_all\nrun_all('tests.board.{path.stem}')"
-    output = run_mpy(program) if runtime == "unix" else run_gauge(_tree(), program)[0].output
+    if runtime == "unix":
+        output = run_mpy(program, library=(*LIBRARY, messages))
+    else:
+        output = run_gauge(_tree(messages), program)[0].output
     report = read_report(output)
     assert set(report) == _functions(path), f"not every test ran:\n{output}"
     for name, failure in report.items():
@@ -75,8 +103,9 @@ def _not_on(path: Path) -> tuple[str, ...]:
     return ()
 
 
-def _tree() -> Tree:
+def _tree(messages: Path) -> Tree:
     tree = board_tree()
+    tree.update((str(path.relative_to(messages)), path.read_bytes()) for path in messages.rglob("*.py"))
     tree.update((f"tests/board/{path.name}", path.read_bytes()) for path in _FOLDER.glob("*.py"))
     return tree
 
