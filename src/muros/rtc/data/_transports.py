@@ -14,10 +14,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Final, Protocol, TypeAlias
 
+from muros.findings import Finding
 from muros.rtc.codes import PortStatus, RtcError
 from muros.rtc.data._types import AnyDataType
 from muros.rtc.profiles import ConnectorProfile, PropertyValue
-from muros.rtc.reports import Reporter
 
 __all__ = [
     "TRANSPORTS",
@@ -52,13 +52,16 @@ class Connection:
     """As it stands at this step of the negotiation."""
     options: Mapping[str, str]
     """The effective properties of this side, without `dataport.` and `dataport.inport.` or `dataport.outport.`."""
-    data_type: AnyDataType
-    """Of this side's port."""
+    codec: AnyDataType
+    """The serializer agreed on, for this side's data type."""
+    marshaling: str
+    """Its name."""
     little: bool
     """The endianness agreed on."""
     port_name: str
     """`<instance>.<port>`, for findings."""
-    reporter: Reporter
+    report: Callable[[Finding], object]
+    """Takes findings."""
 
 
 class Offer(Protocol):
@@ -73,7 +76,7 @@ class Offer(Protocol):
 
 
 class Inlet(Protocol):
-    """The way to an InPort, as its OutPort has it. Used by one thread at a time."""
+    """The way to an InPort, as its OutPort has it. Any thread may use it, several at once, too."""
 
     def put(self, octets: bytes) -> PortStatus:
         """Bring `octets` (not changed afterwards) there; what the InPort answers. PeerLostError if nobody does."""
@@ -83,7 +86,7 @@ class Inlet(Protocol):
 
 
 class Outlet(Protocol):
-    """The way to an OutPort, as its InPort has it. Used by one thread at a time."""
+    """The way to an OutPort, as its InPort has it. Any thread may use it, several at once, too."""
 
     def get(self) -> tuple[PortStatus, bytes]:
         """Fetch a value's octets; BUFFER_EMPTY and none if there is no value. PeerLostError if nobody answers."""
@@ -113,11 +116,13 @@ class PullTransport(Protocol):
 
 
 class _Registry:
-    """Transports by `dataport.interface_type`, in the order of registering."""
+    """Transports by `dataport.interface_type`."""
 
     def __init__(self) -> None:
         self.push: Final[dict[str, PushTransport]] = {}
         self.pull: Final[dict[str, PullTransport]] = {}
+        self.marshaling: Final[dict[str, Callable[[AnyDataType], str]]] = {}
+        """The serializer of a data type on a transport, where the connection names none and it is not `cdr`."""
 
 
 TRANSPORTS: Final = _Registry()
@@ -125,9 +130,18 @@ TRANSPORTS: Final = _Registry()
 
 
 def register_transport(
-    interface_type: str, *, push: PushTransport | None = None, pull: PullTransport | None = None
+    interface_type: str,
+    *,
+    push: PushTransport | None = None,
+    pull: PullTransport | None = None,
+    marshaling: Callable[[AnyDataType], str] | None = None,
 ) -> None:
-    """Let connections ask for `dataport.interface_type` = `interface_type`, with the dataflow types given."""
+    """Let connections ask for `dataport.interface_type` = `interface_type`, with the dataflow types given.
+
+    `marshaling`: the serializer of a data type where a connection names none, "" if there is none; default `cdr`.
+    """
+    if marshaling is not None:
+        TRANSPORTS.marshaling[interface_type] = marshaling
     if push is not None:
         TRANSPORTS.push[interface_type] = push
     if pull is not None:

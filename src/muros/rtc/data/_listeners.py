@@ -1,0 +1,126 @@
+"""What listeners of a data port are told, and what they may answer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum, IntFlag
+from typing import Any, Final, TypeAlias
+
+from muros.rtc.listeners import Listeners
+
+__all__ = [
+    "Changes",
+    "ConnectorEvent",
+    "ConnectorInfo",
+    "DataEvent",
+    "DataListeners",
+]
+
+
+class DataEvent(Enum):
+    """Moments at which a value is at hand. Listeners are called with the `ConnectorInfo` and the value."""
+
+    ON_BUFFER_WRITE = "ON_BUFFER_WRITE"
+    """It stands in the buffer."""
+    ON_BUFFER_FULL = "ON_BUFFER_FULL"
+    """The buffer did not take it."""
+    ON_BUFFER_WRITE_TIMEOUT = "ON_BUFFER_WRITE_TIMEOUT"
+    """There was no room for it in time."""
+    ON_BUFFER_OVERWRITE = "ON_BUFFER_OVERWRITE"
+    """It was taken, and the oldest value lost for it."""
+    ON_BUFFER_READ = "ON_BUFFER_READ"
+    """It was taken out of the buffer."""
+    ON_SEND = "ON_SEND"
+    """The OutPort is about to send it."""
+    ON_RECEIVED = "ON_RECEIVED"
+    """The InPort has got it; at the OutPort: the InPort has taken it."""
+    ON_RECEIVER_FULL = "ON_RECEIVER_FULL"
+    ON_RECEIVER_TIMEOUT = "ON_RECEIVER_TIMEOUT"
+    ON_RECEIVER_ERROR = "ON_RECEIVER_ERROR"
+
+
+class ConnectorEvent(Enum):
+    """Moments at which there is no value. Listeners are called with the `ConnectorInfo`."""
+
+    ON_BUFFER_EMPTY = "ON_BUFFER_EMPTY"
+    ON_BUFFER_READ_TIMEOUT = "ON_BUFFER_READ_TIMEOUT"
+    ON_SENDER_EMPTY = "ON_SENDER_EMPTY"
+    ON_SENDER_TIMEOUT = "ON_SENDER_TIMEOUT"
+    ON_SENDER_ERROR = "ON_SENDER_ERROR"
+    ON_CONNECT = "ON_CONNECT"
+    ON_DISCONNECT = "ON_DISCONNECT"
+
+
+class Changes(IntFlag):
+    """What a listener of a `DataEvent` answers. None is NO_CHANGE.
+
+    DATA_CHANGED: the value it was given, which it has changed, replaces what is sent on or stored. With a new value,
+    answer the pair `(Changes.DATA_CHANGED, value)`.
+    """
+
+    NO_CHANGE = 0
+    INFO_CHANGED = 1
+    DATA_CHANGED = 2
+    BOTH_CHANGED = 3
+
+
+@dataclass(slots=True)
+class ConnectorInfo:
+    """A connection as listeners see it."""
+
+    name: str
+    connector_id: str
+    ports: tuple[object, ...]
+    properties: dict[str, str] = field(default_factory=dict)
+    """What holds for this side, without `dataport.`."""
+
+
+DataCallback: TypeAlias = "Callable[[ConnectorInfo, Any], object]"
+
+
+class DataListeners:
+    """The listeners of one data port; they live as long as the port, over all its connections.
+
+    `on_error(event, error)` hears of one that raised.
+    """
+
+    def __init__(self, on_error: Callable[[DataEvent | ConnectorEvent, Exception], object]) -> None:
+        self._on_error: Final = on_error
+        self.data: Final = Listeners[DataEvent](on_error)
+        self.connector: Final = Listeners[ConnectorEvent](on_error)
+
+    def add(
+        self, event: DataEvent | ConnectorEvent, callback: Callable[..., object]
+    ) -> Callable[..., object]:
+        """Tell `callback` of `event` from now on. Returns it."""
+        if isinstance(event, DataEvent):
+            return self.data.add(event, callback)
+        return self.connector.add(event, callback)
+
+    def remove(self, event: DataEvent | ConnectorEvent, callback: Callable[..., object]) -> bool:
+        """Tell `callback` no longer. False where it was not there."""
+        if isinstance(event, DataEvent):
+            return self.data.remove(event, callback)
+        return self.connector.remove(event, callback)
+
+    def tell_value(self, event: DataEvent, info: ConnectorInfo, value: object) -> tuple[bool, object]:
+        """Tell who listens; whether the value was changed, and the value as it is now."""
+        changed = False
+        for callback in self.data.of(event):
+            try:
+                answer = callback(info, value)
+            except Exception as error:
+                self._on_error(event, error)
+                continue
+            if isinstance(answer, tuple) and len(answer) == 2:
+                answer, replacement = answer
+                if answer is not None and answer & Changes.DATA_CHANGED:
+                    value = replacement
+            if isinstance(answer, int) and answer & Changes.DATA_CHANGED:
+                changed = True
+        return changed, value
+
+    def tell(self, event: ConnectorEvent, info: ConnectorInfo) -> None:
+        """Tell who listens."""
+        self.connector.tell(event, info)

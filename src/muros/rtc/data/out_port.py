@@ -1,0 +1,104 @@
+"""OutPorts: values that go, to however many InPorts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, TypeVar, cast
+
+from muros.rtc.codes import DataPortStatus, PortType, ReturnCode
+from muros.rtc.data._links import Link, OutLink, PullSource, PushReceiver, PushSender
+from muros.rtc.data._options import Dataflow, DataOptions, OptionError, Side, Stamp
+from muros.rtc.data._port import DIRECT, DataPort
+from muros.rtc.data._samples import Outgoing, stamp
+from muros.rtc.data._transports import TRANSPORTS, Connection
+from muros.rtc.data._types import DataType
+
+__all__ = ["DataOutPort"]
+
+T = TypeVar("T")
+
+
+class DataOutPort(DataPort[T]):
+    """Values of one data type that go to other components.
+
+    A value is encoded once for all connections that want it in the same form. After `write` it may be changed
+    and written again: nobody else holds it.
+    """
+
+    side: ClassVar[Side] = Side.OUT
+    calls: ClassVar[Dataflow] = Dataflow.PUSH
+    _kind: ClassVar[PortType] = PortType.DATA_OUT
+
+    def __init__(
+        self,
+        name: str,
+        data_type: DataType[T],
+        properties: Mapping[str, str] = {},
+        **more: Any,
+    ) -> None:
+        super().__init__(name, data_type, properties, **more)
+        self.on_write: Callable[[T], object] | None = None
+        """Called with every value before it is sent."""
+        self.on_write_convert: Callable[[T], T] | None = None
+        """Changes every value before it is sent."""
+        self.value: T | None = None
+        """What `write_after` writes."""
+        self.status: list[DataPortStatus] = []
+        """What became of the value written last, by connection (`connector_infos`)."""
+        self._out_links: tuple[OutLink, ...] = ()
+        self._stamps = False
+
+    def write(self, value: T) -> bool:
+        """Send `value` to all connections. True: there are some, and each has taken it; `status` tells more.
+
+        DataError where the data type cannot hold the value. Nothing that a receiver does raises here.
+        """
+        if self.on_write is not None:
+            self._call_back("on_write", self.on_write, value)
+        if self.on_write_convert is not None:
+            returned, converted = self._call_back("on_write_convert", self.on_write_convert, value)
+            if not returned:
+                self.status = [DataPortStatus.INVALID_ARGS] * len(self._out_links)
+                return False
+            value = cast("T", converted)
+        links = self._out_links
+        if self._stamps:
+            stamp(value, self._wall)
+        outgoing = Outgoing(value)
+        status = [link.write(outgoing) for link in links]
+        self.status = status
+        good = bool(links)
+        for one, link in zip(status, links, strict=True):
+            if one is not DataPortStatus.PORT_OK:
+                good = False
+                if one is DataPortStatus.CONNECTION_LOST:
+                    self._drop(link.info.connector_id)
+        return good
+
+    def write_after(self) -> bool:
+        """Write `value`, if there is one. For components that write all ports after they ran."""
+        return self.value is not None and self.write(self.value)
+
+    # ---- inside
+
+    def _receiving_link(self, connection: Connection, options: DataOptions) -> Link:
+        link = PullSource(self._setup(connection, options))
+        if options.interface_type != DIRECT:
+            link.offer = TRANSPORTS.pull[options.interface_type].offer_outlet(connection, link.get)
+        return link
+
+    def _calling_link(self, connection: Connection, options: DataOptions) -> Link:
+        if options.interface_type != DIRECT:
+            return PushSender(
+                self._setup(connection, options),
+                TRANSPORTS.push[options.interface_type].reach_inlet(connection),
+            )
+        receiver = self._link_here(connection.profile, PushReceiver)
+        if receiver is None:
+            raise OptionError(ReturnCode.RTC_ERROR, "direct: the InPort is in another process")
+        return PushSender(self._setup(connection, options), receiver)
+
+    def _links_changed(self) -> None:
+        links = tuple(self._links_by_id.values())
+        self._out_links = tuple(link for link in links if isinstance(link, (PushSender, PullSource)))
+        self._stamps = any(Stamp.ON_WRITE in link.options.stamps for link in self._out_links)
