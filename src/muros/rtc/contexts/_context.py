@@ -198,7 +198,7 @@ class ExecutionContext:
             if running:
                 self._cycle.shutdown()
             for member in members:
-                self._dismiss(member)
+                self._cycle.dismiss(member, running=False)
             return _OK
 
         self._ask(Request("end", work))
@@ -211,7 +211,7 @@ class ExecutionContext:
 
         Of several that share one, the first is its owner.
         """
-        member = Member(component, handle)
+        member = Member(component, handle, owner=True)
 
         def work() -> ReturnCode:
             return self._admit(member)
@@ -258,7 +258,7 @@ class ExecutionContext:
     def remove_component(self, component: Participant) -> ReturnCode:
         """Let a component go: on_deactivated if it is active, on_shutdown if the context runs."""
         member = self._cycle.find(component)
-        if member is None or member in self._owned:
+        if member is None or member.owner:
             return ReturnCode.BAD_PARAMETER
         return self._ask(self._removal(member))
 
@@ -381,26 +381,17 @@ class ExecutionContext:
 
     def _removal(self, member: Member) -> Request:
         def work() -> ReturnCode:
-            self._dismiss(member)
+            self._cycle.dismiss(member, running=self._running)
             return _OK
 
         return Request("letting a component go", work)
-
-    def _dismiss(self, member: Member) -> None:
-        if member not in self._cycle.members:
-            return
-        self._cycle.dismiss(member, running=self._running)
-        if member in self._owned or member.lost:
-            return
-        with suppress(PeerLostError):  # it has let go, too
-            member.participant.detach_context(member.handle)
 
     def _drop_lost(self) -> None:
         if self._cycle.has_lost:
             self._cycle.has_lost = False
             for member in self._cycle.members:
                 if member.lost:
-                    self._dismiss(member)
+                    self._cycle.dismiss(member, running=False)
 
     def _tell(self, event: ContextEvent) -> None:
         for observer in tuple(self._observers.values()):

@@ -23,13 +23,17 @@ _OK: Final = ReturnCode.RTC_OK
 
 
 class Member:
-    """A component in one context."""
+    """A component in one context.
 
-    __slots__ = ("failed", "handle", "lost", "participant", "state")
+    `owner`: the context is one of its own, which it knows without `attach_context`.
+    """
 
-    def __init__(self, participant: Participant, handle: int) -> None:
+    __slots__ = ("failed", "handle", "lost", "owner", "participant", "state")
+
+    def __init__(self, participant: Participant, handle: int, *, owner: bool = False) -> None:
         self.participant: Final = participant
         self.handle: Final = handle
+        self.owner: Final = owner
         self.state = LifeCycleState.INACTIVE_STATE
         self.failed = False
         """It answered an error in this pass."""
@@ -117,13 +121,14 @@ class Cycle:
         self.members = (*self.members, member)
 
     def dismiss(self, member: Member, *, running: bool) -> None:
-        """A component goes, as one that is deactivated and whose context stops."""
+        """A component goes, as one that is deactivated and whose context stops. Nothing where it has gone already."""
         if member not in self.members:
             return
-        if not member.lost:
-            self.ask(member, Ask.DEACTIVATE)
-            if running:
-                self._call(member, "on_shutdown")
+        self.ask(member, Ask.DEACTIVATE)
+        if running:
+            self._call(member, "on_shutdown")
+        if not member.owner:
+            self._call(member, "detach_context")
         self.members = tuple(other for other in self.members if other is not member)
 
     # a pass

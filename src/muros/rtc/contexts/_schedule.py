@@ -34,6 +34,8 @@ class Schedule:
         self.catch_up: Final = catch_up
         self.deadline = math.inf
         """When the next pass is due; never, while nobody is to be called."""
+        self.rate = float(rate)
+        """Passes per second wanted; changed by `set_rate`."""
         self._period = 1.0 / rate
         self._origin = 0.0
         self._index = 0
@@ -43,11 +45,6 @@ class Schedule:
         self._starts = window or Window()
         self._deviations = Window()
         self._durations = Window()
-
-    @property
-    def rate(self) -> float:
-        """Passes per second wanted."""
-        return 1.0 / self._period
 
     @property
     def is_started(self) -> bool:
@@ -72,6 +69,7 @@ class Schedule:
             self._origin += max(0, self._index - 1) * self._period
             self._index = min(self._index, 1)
             self.deadline = self._origin + self._index / rate
+        self.rate = float(rate)
         self._period = 1.0 / rate
         self._starts.clear()
         self._deviations.clear()
