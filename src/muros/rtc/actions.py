@@ -47,7 +47,7 @@ class Action(Enum):
 
 ACTIONS: Final = tuple(Action)
 
-ActionPoint: TypeAlias = "tuple[Literal['PRE', 'POST'], Action]"
+ActionPoint: TypeAlias = tuple[Literal["PRE", "POST"], Action]
 """What listeners are added for: PRE is called with the context's handle, POST with the handle and the return code.
 
 The handle of `INITIALIZE` and `FINALIZE`, which no context calls, is 0.

@@ -337,8 +337,7 @@ class Component:
         for context in tuple(self._participating.values()):
             context.remove_component(self.participation)
         for context in self._owned:
-            context.stop()
-            context.close()
+            context.unbind_owner(self.participation)
         for port in reversed(self.ports):
             self.remove_port(port)
 

@@ -30,6 +30,11 @@ class Participation:
     def __repr__(self) -> str:
         return f"<{self.component.instance_name}>"
 
+    @property
+    def instance_name(self) -> str:
+        """The component's."""
+        return self.component.instance_name
+
     # Contexts
 
     def attach_context(self, context: ExecutionContext) -> int:
