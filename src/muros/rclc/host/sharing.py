@@ -580,9 +580,17 @@ def hand_over(handle: Any) -> Callable[[Callable[[], object]], object] | None:
 
 
 def share(context: Context) -> Sharing:
-    """Has a context shared by threads from now on; what stands between it and its middleware."""
+    """Has a context shared by threads from now on; what stands between it and its middleware.
+
+    Raises RclError where an asyncio loop serves the space of the context: threads may not use that.
+    """
     if isinstance(context.middleware, Sharing):
         return context.middleware
+    if not getattr(context.middleware, "served", True):
+        raise RclError(
+            "the asyncio loop of this program serves the space of this context, which threads cannot share: have "
+            "tasks `await executor.spin_async()`, or give the context a space of its own, as Context('dds:') has"
+        )
     made = Sharing(context)
     context.middleware = made  # type: ignore[assignment]  # nobody sets the state from outside
     context.sharing = made

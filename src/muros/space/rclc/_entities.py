@@ -46,7 +46,7 @@ class Node:
     def destroy(self) -> None:
         """Takes it out of the space, with everything made on it."""
         context = self.context
-        with context.ground.server.lock:
+        with context.ground.lock:
             self.participant.close()
             if self in context.nodes:
                 context.nodes.remove(self)
@@ -64,7 +64,7 @@ class _Entity:
         self.type_name = type_name
         self.entity: Any = None
         self.context = node.context
-        self._lock = node.context.ground.server.lock
+        self._lock = node.context.ground.lock
         self._refused = 0
 
     def destroy(self) -> None:

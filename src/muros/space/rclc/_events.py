@@ -21,7 +21,7 @@ class SpaceEvents:
     def __init__(self, context: SpaceMiddleware, owner: Any, entity: Any) -> None:
         self._owner = owner
         self._end = entity.entity
-        self._lock = context.ground.server.lock
+        self._lock = context.ground.lock
         with self._lock:
             self._end.on_deadline = context.stir
             self._counts = EndpointCounts(context.ground.space, context.domain, self._end, context.stir)

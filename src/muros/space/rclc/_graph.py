@@ -25,7 +25,7 @@ class SpaceGraph:
         self._context = context
         self._domain = domain
         self._on_change = on_change
-        self._lock = context.ground.server.lock
+        self._lock = context.ground.lock
         with self._lock:
             self._end = context.ground.space.graph.watch(self._changed)
 

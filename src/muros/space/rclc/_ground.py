@@ -7,10 +7,12 @@ last of them. A space that was given is the giver's: contexts leave it, and tell
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from muros.findings import Finding
+from muros.rclc.errors import RclError
 from muros.space._door import Space
 from muros.space.rclc._problems import NOT_SCHEDULED
 from muros.space.rclc._serving import Server
@@ -19,6 +21,31 @@ if TYPE_CHECKING:
     from muros.space.rclc._middleware import SpaceMiddleware
 
 __all__ = ["Ground"]
+
+_OF_THE_LOOP: Final = (
+    "the asyncio loop of this program serves this space, and other threads may not use it meanwhile: "
+    "hand it over with loop.call_soon_threadsafe(...), or give the context a space of its own"
+)
+
+
+class LoopLock:
+    """In place of the server's lock where the loop of a program serves a space: it lets in the loop's thread alone.
+
+    Raises RclError for other threads while the loop runs.
+    """
+
+    def __init__(self, lock: threading.RLock, loop: asyncio.AbstractEventLoop) -> None:
+        self._lock = lock
+        self._loop = loop
+        self._thread = threading.get_ident()
+
+    def __enter__(self) -> None:
+        if threading.get_ident() != self._thread and self._loop.is_running():
+            raise RclError(_OF_THE_LOOP)
+        self._lock.acquire()
+
+    def __exit__(self, *error: object) -> None:
+        self._lock.release()
 
 
 class Ground:
@@ -42,6 +69,8 @@ class Ground:
         self.loop = loop
         self.served = served = loop is server.loop
         """Whether we serve it; else the asyncio loop of this thread does, and nobody here can wait."""
+        self.lock = server.lock if served else LoopLock(server.lock, loop)
+        """What is held while the space is used."""
         self.contexts: list[SpaceMiddleware] = []
         self._on_gone = on_gone
         self._deaf = space.findings.on_finding(self._tell)

@@ -99,7 +99,7 @@ class SpaceMiddleware:
     def participant(self, name: str, domain: int = 0, /) -> Node:
         """A node. RclError if the context is closed, or its domain cannot be had here."""
         namespace, _, base = name.rpartition("/")
-        with self._server.lock:
+        with self.ground.lock:
             self.be_open()
             made = Node(self, base, namespace or "/", domain)
             self.nodes.append(made)
@@ -107,7 +107,7 @@ class SpaceMiddleware:
 
     def writer(self, participant: Node, topic: str, type_name: str, qos: AnyQos = "default", /) -> Publisher:
         """A writer."""
-        with self._server.lock:
+        with self.ground.lock:
             return Publisher(participant, topic, type_name, qos_of(qos))
 
     def reader(
@@ -120,7 +120,7 @@ class SpaceMiddleware:
         /,
     ) -> Reader:
         """A reader."""
-        with self._server.lock:
+        with self.ground.lock:
             return Reader(participant, topic, type_name, qos_of(qos), on_data)
 
     def requester(
@@ -133,7 +133,7 @@ class SpaceMiddleware:
         /,
     ) -> Requester:
         """A client of a service."""
-        with self._server.lock:
+        with self.ground.lock:
             return Requester(participant, name, type_name, qos_of(qos), on_reply)
 
     def replier(
@@ -146,7 +146,7 @@ class SpaceMiddleware:
         /,
     ) -> Replier:
         """A server of a service."""
-        with self._server.lock:
+        with self.ground.lock:
             return Replier(participant, name, type_name, qos_of(qos), on_request)
 
     # What is done
@@ -185,8 +185,8 @@ class SpaceMiddleware:
         """
         if not self.ground.served:
             raise RclError(
-                "waiting would stop the asyncio loop that serves this space: have a task `await "
-                "executor.spin_async()` (or spin_some_async), or give the context a space of its own"
+                "waiting would stop the asyncio loop that serves this space, and other threads may not use it: have "
+                "a task `await executor.spin_async()` (or spin_some_async), or give the context a space of its own"
             )
         if self.closed:
             time.sleep(timeout / 1000)
@@ -204,7 +204,7 @@ class SpaceMiddleware:
 
     def not_scheduled(self, who: str, why: str) -> None:
         """A finding: the system does not schedule some threads of this program as they should be."""
-        with self._server.lock:
+        with self.ground.lock:
             self.ground.space.findings.report(
                 NOT_SCHEDULED,
                 who=who,
@@ -221,7 +221,7 @@ class SpaceMiddleware:
 
     def close(self) -> None:
         """Leaves the space, with every node; problems not told yet are told. Closing twice is allowed."""
-        with self._server.lock:
+        with self.ground.lock:
             if self.closed:
                 return
             self.closed = True
