@@ -11,3 +11,52 @@ configuration sets, as plain Python objects that know nothing of CORBA. Around i
 
 docs/how-rtc-works.md draws the way of a value through them.
 """
+
+from muros.rtc.actions import Action, ComponentEvent
+from muros.rtc.codes import (
+    BufferStatus,
+    DataPortStatus,
+    ExecutionKind,
+    LifeCycleState,
+    PeerLostError,
+    PortStatus,
+    ReturnCode,
+    RtcError,
+)
+from muros.rtc.component import Component
+from muros.rtc.configuration import ConfigEvent, Configuration, ConfigurationSet
+from muros.rtc.data import ConnectorEvent, DataError, DataEvent, DataInPort, DataOutPort
+from muros.rtc.declarations import InPort, OutPort, Parameter
+from muros.rtc.running import run
+from muros.rtc.services import Consumer, NotConnectedError, Provided, Required, ServicePort
+
+__all__ = [
+    "Action",
+    "BufferStatus",
+    "Component",
+    "ComponentEvent",
+    "ConfigEvent",
+    "Configuration",
+    "ConfigurationSet",
+    "ConnectorEvent",
+    "Consumer",
+    "DataError",
+    "DataEvent",
+    "DataInPort",
+    "DataOutPort",
+    "DataPortStatus",
+    "ExecutionKind",
+    "InPort",
+    "LifeCycleState",
+    "NotConnectedError",
+    "OutPort",
+    "Parameter",
+    "PeerLostError",
+    "PortStatus",
+    "Provided",
+    "Required",
+    "ReturnCode",
+    "RtcError",
+    "ServicePort",
+    "run",
+]
