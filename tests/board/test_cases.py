@@ -1,7 +1,7 @@
 """Entities on every runtime, by the ids of the acceptance cases: E of the C library, R of its middleware.
 
-Boards meet through a `Broker`. What only computers do is tested there: lifespans (R11 to R13, R17), looking for an
-agent (R20), refusing what is no type, name or callback at all.
+Boards meet through a `Broker`. Looking for an agent (R20) is among the tests of transports; refusing what is no type,
+name or callback at all is what only computers do.
 """
 
 from muros.client import Qos
@@ -42,18 +42,28 @@ class Pair:
         """The callback of a subscription."""
         self.got.append(message.data)
 
-    def hold(self, **qos: "Any") -> "tuple[Any, Any]":
-        """A publisher, and a subscription whose messages wait: no executor runs it."""
-        publisher = self.one.publisher(Int32, "value")
-        made = self.other.subscription(Int32, "value", nothing, Qos(**qos))
-        executor = Executor(self.other.context, trigger=lambda handles: False)
+    def hold(self, made: "Any") -> "Any":
+        """A handle for which things wait: no executor runs it."""
+        executor = self.broker.executors[1]
+        if executor.trigger is None:
+            executor = Executor(self.other.context, trigger=lambda handles: False)
+            self.broker.executors[1] = executor
         executor.add(made)
-        self.broker.executors[1] = executor
-        self.broker.settle()
-        for i in range(10):
-            self.broker.until(lambda i=i: publisher.publish(Int32(data=i)))  # type: ignore[misc]
+        return made
+
+    def say(self, publisher: "Any", *numbers: int) -> None:
+        """Publishes numbers, each of which comes."""
+        for i in numbers:
+            assert publisher.publish(Int32(data=i))
             self.broker.run(5)
-        return made, executor
+
+
+def taken(subscription: "Any") -> "list[int]":
+    """The numbers that wait."""
+    numbers: "list[int]" = []
+    while subscription.ready(subscription.context.clock()):
+        numbers.append(subscription.take().data)
+    return numbers
 
 
 def test_e1_init() -> None:
@@ -240,12 +250,52 @@ def test_r10_wait_timeout() -> None:
     assert broker.now >= start + 10
 
 
+def test_r11_take_expired() -> None:
+    pair = Pair()
+    publisher = pair.one.publisher(Int32, "value")
+    made = pair.hold(pair.other.subscription(Int32, "value", nothing, Qos(lifespan=100)))
+    pair.broker.settle()
+    pair.say(publisher, 1)
+    assert made.ready(pair.broker.now)
+    pair.broker.run(100)
+    assert not made.ready(pair.broker.now)
+    assert (made.take(), made.expired) == (None, 1)
+
+
+def test_r12_and_r13_what_is_fresh_comes_in_order() -> None:
+    pair = Pair()
+    publisher = pair.one.publisher(Int32, "value")
+    short, long = [
+        pair.hold(pair.other.subscription(Int32, "value", nothing, Qos(lifespan=lifespan)))
+        for lifespan in (100, 1000)
+    ]
+    pair.broker.settle()
+    pair.say(publisher, 1)
+    pair.broker.run(100)
+    assert (taken(short), taken(long)) == ([], [1])
+    pair.say(publisher, 2, 3)
+    fresh = taken(long)
+    assert fresh in ([2, 3], [3]), "boards have one message object"
+    assert taken(short) == fresh
+    assert (short.expired, long.expired) == (1, 0)
+
+
+def test_what_is_fresh_is_delivered() -> None:
+    pair = Pair()
+    publisher = pair.one.publisher(Int32, "value")
+    pair.other.subscription(Int32, "value", pair.keep, Qos(lifespan=100))
+    pair.broker.settle()
+    pair.say(publisher, 1, 2, 3)
+    assert pair.got == [1, 2, 3]
+
+
 def test_r14_and_r15_what_waits() -> None:
     pair = Pair()
-    made, _ = pair.hold(depth=4)
-    waits: "list[int]" = []
-    while made.ready(0):
-        waits.append(made.take().data)
+    publisher = pair.one.publisher(Int32, "value")
+    made = pair.hold(pair.other.subscription(Int32, "value", nothing, Qos(depth=4)))
+    pair.broker.settle()
+    pair.say(publisher, *range(10))
+    waits = taken(made)
     assert waits == list(range(10))[-len(waits) :], "the newest, in order"
     assert len(waits) in (1, 4), "boards have one message object"
     assert made.lost == 10 - len(waits)
@@ -277,6 +327,28 @@ def test_r16_request_and_reply() -> None:
     assert len(set(identities)) == 3
     assert [len(identity) for identity in identities] == [24] * 3
     assert client.call(AddTwoInts.Request(a=20, b=22)).sum == 42
+
+
+def test_r17_request_expired() -> None:
+    pair = Pair()
+    service = pair.hold(pair.other.service(AddTwoInts, "add", answer, Qos(lifespan=100)))
+    client = pair.one.client(AddTwoInts, "add")
+    pair.broker.settle()
+    sums: "list[int]" = []
+
+    def ask(n: int) -> None:
+        assert client.send(AddTwoInts.Request(a=n), lambda reply: sums.append(reply.sum))
+
+    ask(1)
+    pair.broker.run(50)
+    ask(2)
+    pair.broker.run(60)
+    assert service.ready(pair.broker.now)
+    assert service.expired == 1
+    pair.broker.executors[1].trigger = None
+    ask(3)
+    pair.broker.until(lambda: len(sums) == 2)
+    assert (sums, service.expired) == ([2, 3], 1)
 
 
 def test_r18_reply_expired() -> None:

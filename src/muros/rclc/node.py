@@ -61,7 +61,14 @@ def subscription(
     def enter(taker: "Any") -> "Any":  # a session calls its ``deliver``, which saves the heap a bound method
         return self.context.middleware.reader(self.participant, self._topic(topic), kind.TYPE, qos, taker)
 
-    made: "Subscription" = _join(self, Subscription(self.context, kind, callback), enter, memory, kind)
+    lifespan = getattr(qos, "lifespan", 0)
+    if lifespan:
+        from muros.rclc.lifespans import ExpiringSubscription
+
+        made: "Subscription" = ExpiringSubscription(self.context, kind, callback, lifespan)
+    else:
+        made = Subscription(self.context, kind, callback)
+    _join(self, made, enter, memory, kind)
     return made
 
 
@@ -93,7 +100,14 @@ def service(
             self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
         )
 
-    made: "Service" = _join(self, Service(self.context, kind, callback), enter, memory, kind.Request)
+    lifespan = getattr(qos, "lifespan", 0)
+    if lifespan:
+        from muros.rclc.lifespans import ExpiringService
+
+        made: "Service" = ExpiringService(self.context, kind, callback, lifespan)
+    else:
+        made = Service(self.context, kind, callback)
+    _join(self, made, enter, memory, kind.Request)
     return made
 
 
@@ -108,7 +122,8 @@ def client(
             self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
         )
 
-    made: "Client" = _join(self, Client(self.context, kind), enter, memory, kind.Response)
+    made = Client(self.context, kind)
+    _join(self, made, enter, memory, kind.Response)
     return made
 
 
@@ -127,7 +142,7 @@ def __getattr__(name: str) -> "Any":
 
 def _join(
     self: "Node", made: "Any", enter: "Callable[[Any], Any]", memory: "Rules | None", kind: "Any"
-) -> "Any":
+) -> None:
     """Has the middleware make what stands behind a handle; where it cannot, the handle is gone, too."""
     try:
         made.entity = enter(memory.guard(made, kind) if memory else made)
@@ -135,7 +150,6 @@ def _join(
         made.destroy()
         raise
     self.entities.append(made)
-    return made
 
 
 def _topic(self: "Node", name: str) -> str:

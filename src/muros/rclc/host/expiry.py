@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from muros.client.qos import profile
 from muros.rclc.host.entities import Service
 from muros.rclc.host.handles import Subscription
+from muros.rclc.lifespans import drop
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -60,14 +61,7 @@ class ExpiringSubscription(Subscription):
             self._since.append(now)
 
     def _drop(self, now: int) -> None:
-        """Drops what is too old; what was taken in the meantime has no time any more."""
-        since, waiting = self._since, self._waiting
-        while len(since) > len(waiting):
-            since.popleft()
-        while since and now - since[0] >= self._lifespan:
-            since.popleft()
-            waiting.popleft()
-            self.expired += 1
+        self.expired += drop(self._since, self._waiting, self._lifespan, now)
 
 
 class ExpiringService(Service):
@@ -99,10 +93,4 @@ class ExpiringService(Service):
             self._since.append(now)
 
     def _drop(self, now: int) -> None:
-        since, waiting = self._since, self._waiting
-        while len(since) > len(waiting):
-            since.popleft()
-        while since and now - since[0] >= self._lifespan:
-            since.popleft()
-            waiting.pop(0)
-            self.expired += 1
+        self.expired += drop(self._since, self._waiting, self._lifespan, now)
