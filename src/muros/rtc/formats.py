@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-__all__ = ["Fields", "binding_of", "expand"]
+__all__ = ["Fields", "expand"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,19 +47,6 @@ def expand(form: str, fields: Fields, environment: Mapping[str, str]) -> str:
         return "%" if letter == "%" else str(getattr(fields, _LETTERS[letter]))
 
     return _PART.sub(text_of, form)
-
-
-def binding_of(name: str) -> tuple[tuple[str, str], ...]:
-    """The (id, kind) of a name's parts: `a.host_cxt/b.c.rtc` has `a`, `host_cxt` and `b.c`, `rtc`.
-
-    The kind is what stands behind the last dot. Empty parts are left out.
-    """
-    parts = []
-    for part in name.split("/"):
-        before, dot, behind = part.strip().rpartition(".")
-        if part.strip():
-            parts.append((before, behind) if dot else (behind, ""))
-    return tuple(parts)
 
 
 _LETTERS: Final = {

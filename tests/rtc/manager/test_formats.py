@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from muros.rtc.formats import Fields, binding_of, expand
+from muros.rtc.formats import Fields, expand
 
 FIELDS = Fields("Foo0", "Foo", "1.2", "AIST", "test", "robot", "manager", "4711")
 
@@ -34,17 +34,3 @@ def test_what_is_filled_in_is_not_looked_at_again() -> None:
 @given(st.text(st.characters(exclude_characters="%$")))
 def test_a_text_without_letters_stands_for_itself(form: str) -> None:
     assert expand(form, FIELDS, {}) == form
-
-
-@pytest.mark.parametrize(
-    ("name", "parts"),
-    [
-        ("robot.host_cxt/Foo0.rtc", (("robot", "host_cxt"), ("Foo0", "rtc"))),
-        ("robot.example.org.host_cxt/manager.mgr", (("robot.example.org", "host_cxt"), ("manager", "mgr"))),
-        ("alone", (("alone", ""),)),
-        ("/a.b// ", (("a", "b"),)),
-        ("", ()),
-    ],
-)
-def test_parts_of_a_name(name: str, parts: tuple[tuple[str, str], ...]) -> None:
-    assert binding_of(name) == parts

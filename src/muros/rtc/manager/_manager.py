@@ -1,0 +1,595 @@
+"""Manager: makes components, names them, connects them, ends them, as `rtc.conf` and other programs ask.
+
+Its life: `start` brings the ORB, the name service and the log up and does what the settings list (preload, precreate,
+preconnect, preactivation); `wait` returns when it is to end; `close` takes everything back. `shutdown` may be called
+from anywhere: it only says that the end has come.
+
+Calls come from the ORB's threads, the timer's and the user's. No lock is held over a component's actions or a call to
+another process.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Mapping
+from enum import Enum
+from pathlib import Path
+from typing import Final
+
+from muros.rtc.actions import ComponentEvent
+from muros.rtc.codes import ReturnCode, RtcError
+from muros.rtc.component import Component
+from muros.rtc.formats import Fields, expand
+from muros.rtc.listeners import Listeners
+from muros.rtc.manager._colleagues import Colleagues
+from muros.rtc.manager._defaults import DEFAULTS
+from muros.rtc.manager._factories import Factories, Factory
+from muros.rtc.manager._instances import POLICIES, instance_properties, numbered_names
+from muros.rtc.manager._logger import Log
+from muros.rtc.manager._modules import LoadedModule, ModuleError, Modules
+from muros.rtc.manager._requests import (
+    ComponentId,
+    CreateRequest,
+    parse_connect_untrusted,
+    parse_create_untrusted,
+)
+from muros.rtc.manager._settings import Settings
+from muros.rtc.manager._timer import Timer
+from muros.rtc.manager._world import World
+from muros.rtc.ports import Port
+from muros.rtc.profiles import ConnectorProfile, Reference
+from muros.rtc.properties import ConfError, Properties, split_list
+from muros.rtc.reports import Reporter
+
+__all__ = ["CreateError", "Manager", "ManagerEvent"]
+
+CONNECT_AGAIN: Final = 1.0
+"""Seconds after which a connection of `preconnect` is tried again while one of its components is missing."""
+
+
+class CreateError(RtcError):
+    """A component cannot be made; the text says why."""
+
+
+class ManagerEvent(Enum):
+    """What listeners of a manager hear of, with what they are called with."""
+
+    MODULE_LOADED = "MODULE_LOADED"  # the LoadedModule
+    MODULE_UNLOADED = "MODULE_UNLOADED"  # the LoadedModule
+    COMPONENT_CREATED = "COMPONENT_CREATED"  # the component
+    COMPONENT_ENDED = "COMPONENT_ENDED"  # the component
+    NAMES_BOUND = "NAMES_BOUND"  # the component, its names
+    NAMES_UNBOUND = "NAMES_UNBOUND"  # the component, its names
+    SHUTDOWN = "SHUTDOWN"  # nothing
+
+
+class Manager:
+    """The manager of a process.
+
+    `settings` as `read_settings` gives them; `world` what it is connected to others by (None: CORBA); `log` where to
+    write (None: as the settings say). ConfError for settings that cannot be.
+    """
+
+    def __init__(self, settings: Settings, *, world: Callable[[Manager], World] | None = None) -> None:
+        self.settings: Final = settings.properties
+        self.folder: Final = Path.cwd()
+        self.reporter: Final = Reporter()
+        self.factories: Final = Factories()
+        self.modules: Final = Modules(self.settings.node("manager.modules"), self.folder)
+        self.listeners: Final = Listeners[ManagerEvent](
+            lambda event, error: self.reporter.failed(
+                "listener-failed", self.name, f"a listener of {event.value} raised", error
+            )
+        )
+        self.timer: Final = Timer(
+            lambda error: self.reporter.failed("task-failed", self.name, "a timer's task raised", error)
+        )
+        for key in ("manager.instance_name", "manager.name"):
+            self.settings[key] = self._expand(self.settings[key])
+        if self.settings["manager.components.naming_policy"] not in POLICIES:
+            raise ConfError(
+                f"manager.components.naming_policy: there is no {self.settings['manager.components.naming_policy']!r};"
+                f" there are {', '.join(POLICIES)}"
+            )
+        self.log: Final = Log(self.settings.node("logger"), self._fields())
+        self._end_log = self.reporter.on_finding(self.log.finding)
+        self._make_world = world
+        self._world: World | None = None
+        self._colleagues: Colleagues | None = None
+        self._components: dict[str, Component] = {}
+        self._modules_of: dict[Path, list[Factory]] = {}
+        self._loading: Path | None = None
+        self._names: dict[str, tuple[str, ...]] = {}
+        self._references: dict[str, Reference] = {}
+        self._lock = threading.RLock()
+        self._load_lock = threading.RLock()  # as Python's own lock for imports, held while modules run
+        self._made = 0
+        self._ending = threading.Event()
+        self._closed = False
+
+    # What it is
+
+    @property
+    def name(self) -> str:
+        """What other managers and tools call it."""
+        return self.settings["manager.instance_name"]
+
+    @property
+    def is_master(self) -> bool:
+        """Whether it only directs slaves."""
+        return self.settings.flag("manager.is_master")
+
+    @property
+    def world(self) -> World:
+        """The ORB and what it leads to. RtcError before `start`."""
+        if self._world is None:
+            raise RtcError("the manager has not been started: call start first")
+        return self._world
+
+    @property
+    def colleagues(self) -> Colleagues:
+        """The other managers. RtcError before `start`."""
+        if self._colleagues is None:
+            raise RtcError("the manager has not been started: call start first")
+        return self._colleagues
+
+    def configuration(self) -> dict[str, str]:
+        """All settings, defaults among them."""
+        return {**DEFAULTS, **self.settings}
+
+    # Its life
+
+    def start(self, init: Callable[[Manager], object] | None = None) -> None:
+        """Bring it up: the ORB, its own servant, names, the timer's tasks; then `init`, then what the settings list.
+
+        ConfError for settings that cannot be, RtcError where the ORB does not start. What the settings list and
+        cannot be done is a finding; the rest goes on.
+        """
+        if self._world is not None:
+            raise RtcError("the manager has been started already")
+        self._world = world = (self._make_world or _corba_world)(self)
+        self.settings.update(world.properties())
+        self._colleagues = Colleagues(world, self.settings, self.reporter)
+        self.log.logger.info(
+            "manager %s starts (pid %s, %s)",
+            self.name,
+            os.getpid(),
+            self.settings.get("config_file", "no rtc.conf"),
+        )
+        if self.settings.flag("manager.corba_servant"):
+            own = world.offer_manager(self, self.settings["manager.name"])
+            if self.is_master and self.settings.flag("naming.enable"):
+                world.bind(self._names_of_manager(), own)
+            self._colleagues.begin(own)
+            if not self.is_master and self.settings.flag("corba.update_master_manager.enable"):
+                self._every("corba.update_master_manager.interval", self._colleagues.find_master)
+        if self.settings.flag("naming.enable") and self.settings.flag("naming.update.enable"):
+            self._every("naming.update.interval", world.update_names)
+        self.timer.every(1.0, self.reporter.tick)
+        for name in self.settings.words("manager.modules.preload"):
+            self._try("preload", name, lambda name=name: self.load_module(name))  # type: ignore[misc]
+        if init is not None:
+            init(self)
+        for request in self.settings.words("manager.components.precreate"):
+            self._try("precreate", request, lambda request=request: self.create(request))  # type: ignore[misc]
+        for request in self.settings.words("manager.components.preconnect"):
+            self._preconnect(request)
+        for name in self.settings.words("manager.components.preactivation"):
+            self._try("preactivation", name, lambda name=name: self.activate(name))  # type: ignore[misc]
+        self._shut_down_when_empty()
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until it is to end. False: `timeout` seconds passed before."""
+        return self._ending.wait(timeout)
+
+    def shutdown(self) -> None:
+        """Say that the end has come; whoever `wait`s then calls `close`. Any thread, any number of times."""
+        if not self._ending.is_set():
+            self._ending.set()
+            self.listeners.tell(ManagerEvent.SHUTDOWN)
+
+    @property
+    def is_ending(self) -> bool:
+        """Whether the end has come."""
+        return self._ending.is_set()
+
+    def close(self) -> None:
+        """End all components, take names back, end the ORB and the log. Twice is once; not in a call from outside."""
+        self.shutdown()
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+        self.timer.close()
+        for component in reversed(self.components):
+            self._try("exit", component.instance_name, component.exit)
+        if self._colleagues is not None:
+            self._colleagues.close()
+        if self._world is not None:
+            self._world.unbind(self._names_of_manager() if self.is_master else ())
+            self._world.withdraw_manager()
+            self._world.close()
+        self.log.logger.info("manager %s has ended", self.name)
+        self._end_log()
+        self.log.close()
+
+    def __enter__(self) -> Manager:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    # Modules and factories
+
+    def register(
+        self,
+        kind: type[Component] | Mapping[str, str],
+        create: Callable[[Manager], Component] | None = None,
+        delete: Callable[[Component], object] | None = None,
+    ) -> bool:
+        """Make a kind of component known: a class, or a specification with what makes one. False if it is known.
+
+        `delete` is called with each component of this kind after its end.
+        """
+        if isinstance(kind, type):
+            component = kind
+            factory = Factory(
+                component.spec(), create or (lambda manager: component()), delete, self._loading
+            )
+        elif create is None:
+            raise RtcError("a specification needs a function that creates the component")
+        else:
+            factory = Factory(dict(kind), create, delete, self._loading)
+        new = self.factories.add(factory)
+        if new and factory.module is not None:
+            self._modules_of.setdefault(factory.module, []).append(factory)
+        return new
+
+    def load_module(self, name: str, init: str = "") -> LoadedModule:
+        """Load a module and register what is in it. ModuleError says what was wrong."""
+        with self._load_lock:
+            module = self.modules.load(name, init)
+            if module.path in self._modules_of:
+                return module
+            self._loading = module.path
+            self._modules_of[module.path] = []
+            try:
+                if module.init is not None:
+                    module.init(self)
+                for component in module.components:
+                    self.register(component)
+            except Exception as error:
+                self._forget(self.modules.unload(str(module.path)))
+                raise ModuleError(
+                    f"{module.path}: its init function failed: {type(error).__name__}: {error}"
+                ) from error
+            finally:
+                self._loading = None
+        self.log.logger.info("module %s loaded", module.path)
+        self.listeners.tell(ManagerEvent.MODULE_LOADED, module)
+        return module
+
+    def unload_module(self, name: str) -> None:
+        """Forget a module and its kinds of components; instances stay. ModuleError if it is not loaded."""
+        module = self.modules.unload(name)
+        self._forget(module)
+        self.listeners.tell(ManagerEvent.MODULE_UNLOADED, module)
+
+    def _forget(self, module: LoadedModule) -> None:
+        for factory in self._modules_of.pop(module.path, ()):
+            self.factories.remove(factory)
+
+    # Components
+
+    @property
+    def components(self) -> tuple[Component, ...]:
+        """Those that live, in the order of creation."""
+        with self._lock:
+            return tuple(self._components.values())
+
+    def component(self, name: str) -> Component | None:
+        """The component of an instance name."""
+        return self._components.get(name)
+
+    def components_by_name(self, name: str) -> tuple[Component, ...]:
+        """Those of `NAME`, `CATEGORY/NAME` or `*/NAME`."""
+        category, _, instance = name.rpartition("/")
+        return tuple(
+            component
+            for component in self.components
+            if component.instance_name == instance
+            and category in ("", "*", component.properties.get("category", ""))
+        )
+
+    def reference_of(self, component: Component) -> Reference:
+        """How others call a component."""
+        return self._references[component.instance_name]
+
+    def names_of(self, component: Component) -> tuple[str, ...]:
+        """A component's names in the naming service."""
+        return self._names.get(component.instance_name, ())
+
+    def create(self, request: str) -> Component | Reference:
+        """A component after a request such as `Foo?instance_name=Left`: of this process, or of another manager's.
+
+        A master lets a slave make it; `manager_name` and `manager_address` in the request say which manager is to.
+        CreateError where it cannot be made.
+        """
+        parsed = parse_create_untrusted(request)
+        name = parsed.properties.get("manager_name", "")
+        address = parsed.properties.get("manager_address", "")
+        if address:
+            made = self.world.manager_at(address).create_component(_without(parsed))
+            if made is None:
+                raise CreateError(f"{request}: the manager at {address} could not make it; see its log")
+            return made
+        if self.is_master or (name and name != self.name):
+            language = parsed.id.language or self.settings["manager.language"]
+            return self.colleagues.create(_without(parsed), name=name, language=language)
+        return self.create_component(parsed)
+
+    def create_component(self, request: str | CreateRequest) -> Component:
+        """A component of this process. CreateError where it cannot be made; an existing instance name is that one."""
+        if isinstance(request, str):
+            request = parse_create_untrusted(request)
+        if self.is_ending:
+            raise CreateError(f"{request.id}: the manager is ending")
+        asked_name = request.properties.get("instance_name", "")
+        standing = self.component(asked_name) if asked_name else None
+        if standing is not None:
+            return standing
+        factory = self._factory(request.id)
+        name = self._reserve(factory, request)
+        try:
+            component = self._make(factory, name, request)
+        except BaseException:
+            self.factories.release(name)
+            raise
+        self._welcome(component)
+        return component
+
+    def delete_component(self, name: str) -> ReturnCode:
+        """End a component, one's own or a slave's. BAD_PARAMETER where there is none."""
+        component = self.component(name)
+        if component is not None:
+            return component.exit()
+        return self.colleagues.delete(name)
+
+    def activate(self, name: str) -> None:
+        """Activate a component: one of this process by its name, others by `rtcname://` or `rtcloc://`. RtcError."""
+        component = self.component(name)
+        if component is None:
+            if "://" not in name:
+                raise RtcError(
+                    f"there is no component {name}; there are {', '.join(self._components) or 'none'}"
+                )
+            self.world.activate_at(name)
+            return
+        for context in component.owned_contexts:
+            code = context.activate_component(component.participation)
+            if code is not ReturnCode.RTC_OK:
+                raise RtcError(f"{name} cannot be activated: {code.name}")
+
+    def connect(self, request: str) -> None:
+        """Connect ports as `Comp0.out?port=Comp1.in&subscription_type=new` says. RtcError where it cannot be."""
+        parsed = parse_connect_untrusted(request)
+        ports: list[Port] = []
+        references: dict[str, Reference] = {}
+        for address in parsed.ports:
+            name, _, port = address.rpartition(".")
+            component = self.component(name)
+            if component is not None:
+                ports.append(component.port(port))
+                references[name] = self.reference_of(component)
+            elif "://" not in address:
+                raise self._no_component(name)
+        connection = request.partition("&")[0]
+        if len(ports) < len(parsed.ports):
+            self.world.connect(parsed.ports, references, connection, parsed.properties)
+            return
+        profile = ConnectorProfile(connection, "", tuple(ports), parsed.properties)
+        code, _ = ports[0].connect(profile)
+        if code is not ReturnCode.RTC_OK:
+            raise RtcError(f"{connection} cannot be connected: {code.name}")
+
+    def _no_component(self, name: str) -> RtcError:
+        return RtcError(f"there is no component {name}; there are {', '.join(self._components) or 'none'}")
+
+    # How a component is made, and what follows its end
+
+    def _factory(self, wanted: ComponentId) -> Factory:
+        factory = self.factories.find(wanted)
+        if factory is None and self.settings.flag("manager.modules.search_auto"):
+            path = self.modules.search(wanted.fits)
+            if path is not None:
+                self.load_module(str(path))
+                factory = self.factories.find(wanted)
+        if factory is None:
+            known = ", ".join(factory.name for factory in self.factories.all) or "none"
+            raise CreateError(
+                f"no component {wanted} is known; loaded: {known}. Load its module (manager.modules.preload), or put "
+                "it where manager.modules.load_path leads"
+            )
+        return factory
+
+    def _reserve(self, factory: Factory, request: CreateRequest) -> str:
+        """An instance name that nobody has as far as the naming policy looks."""
+        asked = request.properties.get("instance_name", "")
+        if asked:
+            if not self.factories.reserve(asked, factory):
+                raise CreateError(f"{asked} is being made or ended at this moment; try again")
+            return asked
+        policy = self.settings["manager.components.naming_policy"]
+        taken = set[str]()
+        if policy != "process_unique":
+            taken |= self.colleagues.instance_names()
+        if policy == "ns_unique":
+            taken |= self.world.instance_names()
+        for name in numbered_names(factory.properties.get("type_name") or factory.name):
+            if name in taken or not self.factories.reserve(name, factory):
+                continue
+            names = self._binding_names(name, factory.properties, request.properties)
+            if all(map(self.world.is_free, names)):
+                return name
+            self.factories.release(name)
+            if not any(name in bound for bound in names):  # no number makes a difference
+                self.factories.reserve(name, factory)
+                return name
+        raise AssertionError("numbered_names never ends without an error")
+
+    def _make(self, factory: Factory, name: str, request: CreateRequest) -> Component:
+        try:
+            component = factory.create(self)
+        except Exception as error:
+            self.reporter.failed("create-failed", name, f"{name} could not be constructed", error)
+            raise CreateError(f"{name}: making it raised {type(error).__name__}: {error}") from error
+        properties = instance_properties(
+            factory.properties, name, self.settings, request.properties, find_file=self._find_file
+        )
+        names = self._binding_names(name, properties, {})
+        properties["naming.names"] = ",".join(names)
+        self._names[name] = names
+        component.listeners.add(ComponentEvent.FINALIZED, lambda: self._component_ended(component))
+        component.configure(name, properties, self.reporter)
+        code = component.initialize()
+        if code is not ReturnCode.RTC_OK:
+            self._names.pop(name, None)
+            raise CreateError(f"{name}: on_initialize answered {code.name}; its log says why")
+        return component
+
+    def _welcome(self, component: Component) -> None:
+        name, names = component.instance_name, self._names[component.instance_name]
+        key = f"{component.properties.get('category', '')}.{name}"
+        reference = self.world.offer_component(component, key)
+        with self._lock:
+            self._components[name] = component
+            self._references[name] = reference
+            self._made += 1
+        if self.settings.flag("naming.enable"):
+            self.world.bind(names, reference)
+            self.listeners.tell(ManagerEvent.NAMES_BOUND, component, names)
+        self.log.logger.info("component %s is there as %s", name, ", ".join(names))
+        self.listeners.tell(ManagerEvent.COMPONENT_CREATED, component)
+
+    def _component_ended(self, component: Component) -> None:
+        name = component.instance_name
+        with self._lock:
+            if self._components.pop(name, None) is None:
+                return
+            self._references.pop(name, None)
+            names = self._names.pop(name, ())
+        self.world.unbind(names)
+        self.listeners.tell(ManagerEvent.NAMES_UNBOUND, component, names)
+        self.world.withdraw_component(component)
+        factory = self.factories.release(name)
+        if factory is not None and factory.delete is not None:
+            try:
+                factory.delete(component)
+            except Exception as error:
+                self.reporter.failed("delete-failed", name, f"the delete function of {name} raised", error)
+        self.log.logger.info("component %s has ended", name)
+        self.listeners.tell(ManagerEvent.COMPONENT_ENDED, component)
+        if self._components or self.is_ending:
+            return
+        if self.settings.flag("manager.shutdown_on_nortcs") and not self.is_master:
+            self.shutdown()
+        else:
+            self._shut_down_when_empty()
+
+    # Small things
+
+    def _fields(self, name: str = "", properties: Mapping[str, str] | None = None) -> Fields:
+        properties = properties or {}
+        return Fields(
+            name or self.settings["manager.instance_name"],
+            properties.get("type_name", "manager"),
+            properties.get("version", ""),
+            properties.get("vendor", ""),
+            properties.get("category", ""),
+            self.settings.get("os.hostname", ""),
+            self.settings["manager.name"],
+            str(os.getpid()),
+        )
+
+    def _expand(self, form: str) -> str:
+        return expand(form, self._fields(), os.environ)
+
+    def _binding_names(
+        self, name: str, properties: Mapping[str, str], asked: Mapping[str, str]
+    ) -> tuple[str, ...]:
+        forms = (
+            asked.get("naming.formats") or properties.get("naming.formats") or self.settings["naming.formats"]
+        )
+        quoted = {key: text.replace("\\", "\\\\").replace("/", "\\/") for key, text in properties.items()}
+        fields = self._fields(name.replace("\\", "\\\\").replace("/", "\\/"), quoted)
+        return tuple(dict.fromkeys(expand(form, fields, os.environ) for form in split_list(forms)))
+
+    def _names_of_manager(self) -> tuple[str, ...]:
+        return tuple(map(self._expand, self.settings.words("manager.naming_formats")))
+
+    def _find_file(self, name: str) -> Path:
+        """A component's file: as it is named, or beside the manager's."""
+        path = self.folder / name
+        beside = Path(self.settings.get("config_file", "")).parent / name
+        return beside if not path.is_file() and beside.is_file() else path
+
+    def _every(self, key: str, task: Callable[[], object]) -> None:
+        period = self.settings.number(key, float(DEFAULTS[key]))
+        if period <= 0:
+            raise ConfError(f"{key}: {period:g} is no interval; write seconds, more than 0")
+        self.timer.every(period, task)
+
+    def _shut_down_when_empty(self) -> None:
+        """End if nothing has been made when the time is over."""
+        duration, made = self.settings.number("manager.auto_shutdown_duration", 20.0), self._made
+
+        def look() -> None:
+            if not self._components and self._made == made:
+                self.log.logger.info("no component for %g s: the manager ends", duration)
+                self.shutdown()
+
+        if self.settings.flag("manager.shutdown_auto") and not self.is_master:
+            self.timer.after(max(0.0, duration), look)
+
+    def _preconnect(self, request: str) -> None:
+        try:
+            self.connect(request)
+        except RtcError as error:
+            self.reporter.report(
+                "preconnect-waits",
+                who=self.name,
+                what=f"{request} is not connected",
+                why=str(error),
+                remedy="It is tried again every second; mend manager.components.preconnect if it is wrong",
+                subject=request,
+            )
+            if not self.is_ending:
+                self.timer.after(CONNECT_AGAIN, lambda: self._preconnect(request))
+
+    def _try(self, kind: str, what: str, action: Callable[[], object]) -> None:
+        """Do what the settings list; what goes wrong is a finding."""
+        try:
+            action()
+        except RtcError as error:
+            self.reporter.report(
+                f"{kind}-failed",
+                who=self.name,
+                what=f"{kind} of {what} failed",
+                why=str(error),
+                subject=what,
+            )
+
+
+def _without(request: CreateRequest) -> str:
+    """The request, without what says which manager is to do it."""
+    rest = Properties(
+        {k: v for k, v in request.properties.items() if k not in ("manager_name", "manager_address")}
+    )
+    return str(CreateRequest(request.id, rest))
+
+
+def _corba_world(manager: Manager) -> World:
+    from muros.rtc.corba._manager import CorbaWorld
+
+    return CorbaWorld(manager.settings, manager.reporter)

@@ -1,0 +1,81 @@
+"""A manager as a program: started from a command line, ended by SIGINT, SIGTERM, or the end of its components."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from types import FrameType
+from typing import Final
+
+from muros.findings import Finding
+from muros.rtc.codes import RtcError
+from muros.rtc.component import Component
+from muros.rtc.manager._manager import Manager
+from muros.rtc.manager._settings import parse_options, read_settings
+from muros.rtc.properties import ConfError
+
+__all__ = ["serve", "serve_manager"]
+
+FAILED: Final = 1
+WRONG_USE: Final = 2
+
+
+def serve(components: Sequence[type[Component]], argv: Sequence[str]) -> int:
+    """Serve one instance of each of `components` until the end; the exit status.
+
+    `argv` are a manager's options. Status 1: a component could not be made or the ORB not be started; 2: wrong use.
+    """
+
+    def init(manager: Manager) -> None:
+        for component in components:
+            manager.register(component)
+            manager.create_component(component.spec()["implementation_id"])
+
+    return serve_manager(argv, init)
+
+
+def serve_manager(argv: Sequence[str], init: Callable[[Manager], object] | None = None) -> int:
+    """Start a manager, run `init`, serve until the end; the exit status. Findings go to standard error.
+
+    To be called in the main thread: SIGINT and SIGTERM end it; a second one ends it at once.
+    """
+    try:
+        options = parse_options(argv)
+        if options.words:
+            raise ConfError(f"{options.words[0]!r} is no option of a manager")
+        manager = Manager(read_settings(options, environment=os.environ))
+    except ConfError as error:
+        return _fail(error, WRONG_USE)
+    manager.reporter.on_finding(_show)
+
+    def end(number: int, frame: FrameType | None) -> None:
+        for one in before:
+            signal.signal(one, signal.SIG_DFL)
+        manager.shutdown()
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        try:
+            manager.start(init)
+            manager.wait()
+        finally:
+            manager.close()
+    except ConfError as error:
+        return _fail(error, WRONG_USE)
+    except RtcError as error:
+        return _fail(error, FAILED)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    return 0
+
+
+def _show(finding: Finding) -> None:
+    print(finding.format(), file=sys.stderr, flush=True)
+
+
+def _fail(error: Exception, status: int) -> int:
+    print(f"muros: {error}", file=sys.stderr)
+    return status
