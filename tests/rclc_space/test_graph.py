@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from muros.rclc import Context, Executor, Node
-from muros.rclc.host.graph import CLIENT, PUBLISHER, SERVER, SUBSCRIPTION
+from muros.rclc.host.graph import CLIENT, NO_GRAPH, PUBLISHER, SERVER, SUBSCRIPTION
 from muros.space import open_space
 from tests.client.world import World
 from tests.rclc.test_rclc import two
@@ -222,7 +222,7 @@ def test_who_waits_in_vain_for_an_agent_without_a_graph_is_told() -> None:
     assert not alice.node.graph.wait_for_node("/nobody", timeout=0.5)
     assert not alice.node.client(AddTwoInts, "add").wait_for_service(timeout=0.5)
     assert not alice.node.graph.known
-    assert [code for code, _ in problems] == [22], "once"
+    assert [code for code, _ in problems] == [NO_GRAPH], "once"
     assert "a plain DDS-XRCE agent does not" in problems[0][1]
 
 

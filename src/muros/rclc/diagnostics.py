@@ -30,7 +30,7 @@ ERROR = const(2)
 STALE = const(3)
 """Levels of a value and of a task, whose level is that of its worst value."""
 
-FAILED = const(21)
+FAILED = const(57)
 """The code with which problems tell of a task that has raised."""
 
 _BOOL = const(1)

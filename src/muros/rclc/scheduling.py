@@ -24,6 +24,7 @@ from muros.rclc.host.checks import WrongTypeError, WrongValueError
 
 __all__ = [
     "CRITICAL_PRIORITY",
+    "NOT_SCHEDULED",
     "SOFT_PRIORITY",
     "Policy",
     "apply",
@@ -37,6 +38,9 @@ __all__ = [
     "round_robin",
     "schedule",
 ]
+
+NOT_SCHEDULED: Final = 52
+"""The code with which ``on_problem`` is told that threads are not scheduled as they should be."""
 
 LEAST_PRIORITY: Final = 1
 HIGHEST_PRIORITY: Final = 99

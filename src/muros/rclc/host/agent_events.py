@@ -30,7 +30,7 @@ __all__ = ["TOPIC", "News", "NewsReader", "pack", "read_untrusted"]
 TOPIC: Final = "muros_events_"
 """How the names of these topics begin; four hexadecimal digits follow."""
 TYPE: Final = "muros_msgs/msg/EntityEvents"
-NOT_TOLD: Final = 23
+NOT_TOLD: Final = 56
 """The code with which ``on_problem`` is told that an agent does not tell of events."""
 PATIENCE: Final = 3000
 """Milliseconds of a connection after which an agent is taken for one that does not tell."""

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["AgentGraph", "Endpoint", "Graph", "GraphSource", "GraphWatch"]
 
-NO_GRAPH: Final = 22
+NO_GRAPH: Final = 55
 """The code with which ``on_problem`` is told that a wait was in vain because an agent publishes no graph."""
 
 KINDS: Final = ("publisher", "subscription", "server", "client")

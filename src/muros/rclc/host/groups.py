@@ -47,9 +47,6 @@ __all__ = [
     "Threads",
 ]
 
-NOT_SCHEDULED: Final = 52
-"""The code with which ``on_problem`` is told that threads are not scheduled as they should be."""
-
 THREAD_ENDED: Final = 53
 """The code with which ``on_problem`` is told that a thread has ended because something raised."""
 
@@ -482,7 +479,7 @@ class Threads:
             why = " ".join(f"{', '.join(names)}: {problem}" for problem, names in said.items())
             tell_problem(
                 self.context,
-                NOT_SCHEDULED,
+                scheduling.NOT_SCHEDULED,
                 f"threads run, but not all are scheduled as they should be. {why} They go on with what they have.",
             )
             find = getattr(self.context.middleware, "not_scheduled", None)

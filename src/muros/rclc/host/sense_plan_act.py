@@ -40,7 +40,7 @@ from muros.rclc.executor import Executor
 from muros.rclc.host.checks import WrongTypeError, WrongValueError
 from muros.rclc.host.handles import tell_problem
 from muros.rclc.host.sharing import Bell
-from muros.rclc.scheduling import Policy
+from muros.rclc.scheduling import NOT_SCHEDULED, Policy
 
 __all__ = ["FAWKES_STAGES", "Component", "ComponentError", "SensePlanAct", "State"]
 
@@ -60,8 +60,6 @@ FAWKES_STAGES: Final = (
 
 LATE: Final = 54
 """The code with which ``on_problem`` is told of components that are late, and of barriers that were missed."""
-
-NOT_SCHEDULED: Final = 52
 
 PATIENCE: Final = 1.0
 """Seconds that a stage may take."""
