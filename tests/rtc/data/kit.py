@@ -84,6 +84,8 @@ class Ends:
 
     def get(self) -> tuple[PortStatus, bytes]:
         answer = self._call()
+        if isinstance(answer, PortStatus):
+            return answer, b""
         assert isinstance(answer, tuple)
         return answer
 
