@@ -62,7 +62,7 @@ def appender(kept: list[int]) -> Callable[[Any], None]:
     return lambda msg: kept.append(msg.data)
 
 
-def test_a7_each_group_is_run_by_a_thread_of_its_own(crew: Crew) -> None:
+def test_each_group_is_run_by_a_thread_of_its_own(crew: Crew) -> None:
     far, node = crew.node("far"), crew.node()
     ran: dict[str, list[tuple[int, str]]] = {"high": [], "low": []}
     high = CallbackGroup("high", REAL_TIME_CRITICAL)
@@ -86,7 +86,7 @@ def test_a7_each_group_is_run_by_a_thread_of_its_own(crew: Crew) -> None:
     assert ran["low"] == [(number, "BestEffort") for number in range(20)]
 
 
-def test_a7_a_callback_that_does_not_return_holds_up_nobody_else(crew: Crew) -> None:
+def test_a_callback_that_does_not_return_holds_up_nobody_else(crew: Crew) -> None:
     """What comes for it meanwhile waits, as much as its queue holds; the oldest is dropped."""
     far, node = crew.node("far"), crew.node()
     heard: list[int] = []

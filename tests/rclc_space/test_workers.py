@@ -35,7 +35,7 @@ def spun(crew: Crew, node: Any) -> Any:
     return made
 
 
-def test_a7_the_dispatcher_takes_only_for_workers_that_are_ready(crew: Crew) -> None:
+def test_the_dispatcher_takes_only_for_workers_that_are_ready(crew: Crew) -> None:
     """A busy worker gets nothing, and holds up nobody; what came last meanwhile is there when it is ready again."""
     far, node = crew.node("far"), crew.node()
     fast: list[int] = []
