@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from muros.rtc.contexts import Spread
-from muros.rtc.contexts._schedule import Schedule, is_rate
+from muros.rtc.contexts._schedule import MOST_ANTICIPATED, Anticipation, Schedule, is_rate
 from muros.rtc.contexts._statistics import Window
 
 
@@ -143,3 +143,18 @@ def test_spread() -> None:
     assert Spread.of([]) == Spread(0.0, 0.0, 0.0)
     assert Spread.of([7.0]) == Spread(7.0, 7.0, 7.0)
     assert Spread.of(range(101)) == Spread(50, 99, 100)
+
+
+@given(st.lists(st.floats(-1.0, 10.0)))
+def test_what_is_anticipated_stays_within_bounds(lates: list[float]) -> None:
+    early = Anticipation()
+    for late in lates:
+        early.learn(late)
+        assert 0.0 <= early.seconds <= MOST_ANTICIPATED
+
+
+def test_the_median_lateness_is_learnt() -> None:
+    early = Anticipation()
+    for number in range(500):
+        early.learn((60e-6, 80e-6, 100e-6, 5e-3, 70e-6)[number % 5])
+    assert early.seconds == pytest.approx(80e-6, rel=0.15)

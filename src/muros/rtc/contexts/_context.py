@@ -248,8 +248,9 @@ class ExecutionContext:
             handle = component.attach_context(self)
             member = Member(component, handle)
             return self._ask(Request("taking a component in", lambda: self._admit(member)))
-        except PeerLostError as error:
-            self._note("rtc-member-lost", f"{name_of(component)} cannot be added", str(error))
+        except Exception as error:
+            why = str(error) if isinstance(error, PeerLostError) else f"{type(error).__name__}: {error}"
+            self._note("rtc-member-lost", f"{name_of(component)} cannot be added", why)
             return ReturnCode.RTC_ERROR
         finally:
             with self._changed:

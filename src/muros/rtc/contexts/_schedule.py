@@ -17,7 +17,14 @@ from typing import Final
 
 from muros.rtc.contexts._statistics import ContextStatistics, Spread, Window
 
-__all__ = ["Schedule"]
+__all__ = ["MOST_ANTICIPATED", "Anticipation", "Schedule"]
+
+MOST_ANTICIPATED: Final = 200e-6
+"""Seconds that a thread has itself woken too early at most: it spins for the rest, and others wait for it."""
+
+_STEP: Final = 0.05
+"""Share by which one wake-up corrects what is expected of the next."""
+_LEAST_STEP: Final = 1e-6
 
 
 class Schedule:
@@ -104,6 +111,24 @@ class Schedule:
             deviation=Spread.of(self._deviations.values()),
             duration=Spread.of(self._durations.values()),
         )
+
+
+class Anticipation:
+    """How late the system wakes a thread: the median of what it did lately, so that the thread can ask for it earlier.
+
+    `seconds` says by how much; after half of the wake-ups a little time is left, which the thread spins away.
+    """
+
+    __slots__ = ("seconds",)
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+
+    def learn(self, late: float) -> None:
+        """A thread that was to be woken at some moment ran `late` seconds after it."""
+        step = self.seconds * _STEP + _LEAST_STEP
+        wanted = self.seconds + (step if late > self.seconds else -step)
+        self.seconds = min(max(wanted, 0.0), MOST_ANTICIPATED)
 
 
 def is_rate(rate: object) -> bool:

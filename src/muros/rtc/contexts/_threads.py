@@ -2,19 +2,21 @@
 
 Theory of operation. The thread is the conductor. It does what was asked, then, if the context runs and somebody is
 active or in Error, a pass when one is due; otherwise it waits for a request and costs nothing. To be on time it sleeps
-to the deadline itself; only a wait that is long enough for somebody to become impatient is one on the condition, which
-requests end early. So a component is activated at once also where passes are seconds apart.
+to the deadline itself, less what the system usually wakes it too late by (`Anticipation`); only a wait that is long
+enough for somebody to become impatient is one on the condition, which requests end early. So a component is activated
+at once also where passes are seconds apart.
 """
 
 from __future__ import annotations
 
 import threading
 import time
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from muros.rtc.codes import ExecutionKind, ReturnCode
 from muros.rtc.contexts._context import ExecutionContext
 from muros.rtc.contexts._requests import Request, conducting
+from muros.rtc.contexts._schedule import Anticipation
 
 __all__ = ["EventDrivenExecutionContext", "ExtTrigExecutionContext", "PeriodicExecutionContext"]
 
@@ -102,6 +104,10 @@ class PeriodicExecutionContext(_ThreadedContext):
     kind: ClassVar[ExecutionKind] = ExecutionKind.PERIODIC
     registered_name: ClassVar[str] = "PeriodicExecutionContext"
 
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(**arguments)
+        self._anticipation: Final = Anticipation()
+
     def _turn(self) -> None:
         schedule = self._schedule
         with self._changed:
@@ -117,13 +123,22 @@ class PeriodicExecutionContext(_ThreadedContext):
                 self._changed.wait_for(self._wakes, long)
             if self._wakes():
                 return
-        time.sleep(
-            max(schedule.deadline - self._clock(), 0.0)
-        )  # one that is late gives way to other threads, too
+        self._sleep_until(schedule.deadline)
         if self._requests:
             self._serve()
         if self._running and self._cycle.busy:
             self._pass()
+
+    def _sleep_until(self, deadline: float) -> None:
+        early = self._anticipation
+        moment = deadline - early.seconds
+        left = moment - self._clock()
+        time.sleep(max(left, 0.0))  # a thread that is late gives way to others, too
+        if left > 0:
+            now = self._clock()
+            early.learn(now - moment)
+            while now < deadline:
+                now = self._clock()
 
 
 class ExtTrigExecutionContext(_ThreadedContext):
