@@ -536,19 +536,40 @@ def test_a_flood_for_a_slow_line_keeps_the_newest_and_delays_no_time() -> None:
     assert any(sent.startswith(b"\xff\xfe\x08\x00\xf7\x0a") for sent in scene.link.sent[before - 5 :])
 
 
-def test_a_line_that_takes_nothing_loses_nothing_that_is_urgent() -> None:
+def test_a_line_that_takes_nothing_for_a_moment_loses_nothing() -> None:
     scene = Scene()
     board, led, _ = led_board(scene)
     switch = scene.writer("/led_out", BYTE)
     scene.link.waiting = 100
-    for value in range(60):
+    for value in range(90):
         switch(data=value)
         scene.step(1)
     assert board.taken(led) == []
     scene.link.waiting = 0
     scene.port.room("a", scene.now)
     scene.step(2)
-    assert board.taken(led) == [bytes([value]) for value in range(28, 60)]  # the newest
+    assert board.taken(led) == [bytes([value]) for value in range(90)]
+    assert not scene.told
+
+
+def test_a_line_that_takes_nothing_for_long_gets_the_newest() -> None:
+    """A board that hung must not carry out seconds of old commands."""
+    scene = Scene()
+    board, led, _ = led_board(scene)
+    switch = scene.writer("/led_out", BYTE)
+    scene.link.waiting = 100
+    for value in range(100):
+        switch(data=value)
+        scene.step(20)
+    scene.link.waiting = 0
+    scene.step(30)
+    assert board.taken(led) == [bytes([value]) for value in range(90, 100)]
+    (told,) = [finding for finding in scene.told if finding.code == "line-too-slow"]
+    assert told.count == 90
+    for value in range(90):  # from then on it is a line as before
+        switch(data=value)
+    scene.step(2)
+    assert len(board.taken(led)) == 90
 
 
 def test_a_cable_is_pulled_and_plugged_in_again() -> None:

@@ -177,6 +177,7 @@ class Board:
         self._told_ready = False
         self._told_lost = False
         self._checked_at = 0
+        self._sent_at = -1
 
     @property
     def in_sync(self) -> bool:
@@ -298,6 +299,15 @@ class Board:
         when = self.output.pump(now)
         if when is not None:
             self.wake(when)
+
+    def send(self) -> None:
+        """Sends what a topic has: at once, but what comes in the same millisecond together, which costs less."""
+        now = self.core.clock()
+        if now == self._sent_at:
+            self.wake(now)
+        else:
+            self._sent_at = now
+            self.pump(now)
 
     def report(self, code: str, *, what: str, why: str, remedy: str, subject: str = "", n: int = 1) -> None:
         """Counts a finding about it."""

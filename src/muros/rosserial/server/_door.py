@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, Protocol
 
 __all__ = [
+    "READ_DEPTH",
     "BodyError",
     "Caller",
     "Node",
@@ -21,6 +22,10 @@ __all__ = [
     "Subscriber",
     "World",
 ]
+
+
+READ_DEPTH = 1_000
+"""Messages of one topic that a world keeps for a board while its line has no room; newer ones replace older ones."""
 
 
 class RefusedError(Exception):

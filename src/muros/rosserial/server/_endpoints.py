@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 __all__ = ["Endpoint", "Publication", "ServiceClient", "ServiceServer", "Subscription"]
 
 
+_HELD = 64
+"""Messages of one topic that are kept for a slow line while the board says what it has."""
+
+
 class Endpoint:
     """What all have in common. ``infos`` are the board's words: one for a topic, two for a service."""
 
@@ -135,7 +139,7 @@ class Subscription(Endpoint):
         if not self._queued:
             self._queued = True
             self.board.output.add(self)
-            self.board.pump(self.board.core.clock())
+            self.board.send()
 
     def next(self, now: int) -> bytes | None:
         """The next frame for the board: the oldest message, or on a slow line the oldest of the newest few."""
@@ -144,7 +148,7 @@ class Subscription(Endpoint):
             return None
         info = self.infos[0]
         if self.board.output.byte_us:
-            self._hurry()
+            self.hurry()
         while True:
             body = self._waiting.popleft() if self._waiting else self._take()
             if body is None:
@@ -162,9 +166,9 @@ class Subscription(Endpoint):
     def resume(self) -> None:
         """What has waited in the world may go, all of it: it was not the line that it waited for."""
         if self.board.output.byte_us:
-            while (body := self._take()) is not None:
-                self._waiting.append(body)
-            self._most = max(self._most, len(self._waiting))
+            self._most = max(self._most, _HELD)
+            self._collect()
+            self._most = max(self.board.core.limits.backlog, len(self._waiting))
         self.on_data()
 
     def _take(self) -> bytes | None:
@@ -175,12 +179,16 @@ class Subscription(Endpoint):
             except BodyError as error:
                 self.malformed(error, "to")
 
-    def _hurry(self) -> None:
-        """Lets what is old go, where the line is slower than what is published."""
+    def hurry(self) -> None:
+        """Lets what is old go, as the line is slower than what is published."""
+        if not self._waiting:
+            self._most = self.board.core.limits.backlog
+        self._collect()
+
+    def _collect(self) -> None:
+        """Takes what has come, and drops the oldest beyond the number that may wait here."""
         waiting = self._waiting
         dropped = 0
-        if not waiting:
-            self._most = self.board.core.limits.backlog
         while (body := self._take()) is not None:
             waiting.append(body)
             if len(waiting) > self._most:

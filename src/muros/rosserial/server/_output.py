@@ -1,8 +1,8 @@
 """What a board is sent, in which order and how fast: what is urgent first, then its topics in turn.
 
 A line whose rate is known is written at most `lead` milliseconds ahead, so that what is urgent never waits behind
-a backlog. Others are written while the system takes it at once. What a line has no room for stays where it is:
-messages in their readers, where newer ones replace older ones.
+a backlog. Others are written while the system takes it at once. What a line has no room for stays where it is,
+messages in their readers; when it has had none for long, newer ones replace older ones.
 """
 
 from collections import deque
@@ -11,6 +11,8 @@ from typing import Any, Protocol
 
 __all__ = ["Link", "Output", "Source"]
 
+_STALL = 100
+"""A line that takes nothing for so long is too slow for what waits: of each topic the newest messages stay, in ms."""
 _POLL = 20
 """When to look again at a line that takes nothing now, in ms; the link says it earlier if it can."""
 _SLACK = 1.005
@@ -39,6 +41,9 @@ class Source(Protocol):
     def next(self, now: int) -> bytes | None:
         """The next frame for the board, None if there is none now."""
 
+    def hurry(self) -> None:
+        """Lets what is old go."""
+
 
 class Output:
     """The way to one board. ``byte_us``: microseconds that a byte takes on the line, 0 if unknown; ``lead`` in ms.
@@ -60,6 +65,7 @@ class Output:
         self._urgent: deque[bytes | Callable[[int], bytes]] = deque()
         self._ready: deque[Source] = deque()
         self._free_us = 0.0
+        self._stalled: int | None = None
 
     def post(self, frame: bytes | Callable[[int], bytes]) -> bool:
         """Has a frame sent before all topics, one made by ``frame(now)`` when its turn has come; False if many wait."""
@@ -91,7 +97,11 @@ class Output:
             if self._free_us > now_us + self._lead_us:
                 return now + max(1, int(self._free_us - now_us - self._lead_us) // 1000)
             if self.link.backlog(self.address):
+                if self._stalled is None:
+                    self._stalled = now
                 return now + _POLL
+            if self._stalled is not None:
+                self._let_go(now - self._stalled)
             batch, n = self._batch(now, now_us)
             if not batch:
                 return None
@@ -102,6 +112,13 @@ class Output:
             else:
                 self.dropped += len(batch)
         return None
+
+    def _let_go(self, stalled: int) -> None:
+        """The line takes something again, after so many ms."""
+        self._stalled = None
+        if stalled >= _STALL:
+            for source in self._ready:
+                source.hurry()
 
     def _batch(self, now: int, now_us: int) -> tuple[list[bytes], int]:
         """The next frames to send, and their bytes: as many as are worth one call, and the line is free for."""

@@ -27,12 +27,10 @@ from muros.ros1 import (
     UnreachableError,
     resolve,
 )
-from muros.rosserial.server._door import BodyError, RefusedError
+from muros.rosserial.server._door import READ_DEPTH, BodyError, RefusedError
 
 __all__ = ["Ros1World"]
 
-READ_DEPTH = 10
-"""Messages that wait for a board whose line is slower; the oldest go first."""
 LOOK = 1.0
 """Seconds between looks at whether somebody serves what a board calls."""
 

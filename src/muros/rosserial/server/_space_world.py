@@ -12,7 +12,7 @@ from typing import Any
 
 from muros import interfaces
 from muros.interfaces import CdrError, Converter, InterfaceError
-from muros.rosserial.server._door import BodyError, RefusedError
+from muros.rosserial.server._door import READ_DEPTH, BodyError, RefusedError
 from muros.rosserial.server._node_parameters import PARAMETER_KINDS, NodeParameters
 from muros.rosserial.server._parameters import plain_name
 from muros.space import (
@@ -38,8 +38,6 @@ _LEVELS = (10, 20, 30, 40, 50)
 """Levels of rcl_interfaces/msg/Log for those of rosserial."""
 _USE_SIM_TIME = "use_sim_time"
 _STATUS = ("OK", "WARN", "ERROR")
-_READ_DEPTH = 32
-"""Messages that wait for a board whose line is slower; the oldest go first."""
 
 
 class SpaceWorld:
@@ -321,7 +319,7 @@ class _Subscriber(_Converted):
             if any(qos.reliability < Reliability.RELIABLE for qos in writers)
             else Reliability.RELIABLE,
             Durability.TRANSIENT_LOCAL if latched else Durability.VOLATILE,
-            depth=_READ_DEPTH,
+            depth=READ_DEPTH,
         )
         self.reader = self._read()
         node.subscribers.append(self)
