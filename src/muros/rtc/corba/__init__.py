@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from muros.rtc.corba._importer import add_idl_folder, install, remove_idl_folder
 
 if TYPE_CHECKING:
+    from muros.rtc.corba._codec import IdlDataType, data_type_of
     from muros.rtc.corba._name_server import RunningNameServer, start_name_server
     from muros.rtc.corba._naming import Binding, Names, NameServer, server_address, split_path
     from muros.rtc.corba._orb import Orb, current_orb, endpoint_arguments, start_orb
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Binding",
+    "IdlDataType",
     "IdlError",
     "NameServer",
     "Names",
@@ -26,6 +28,7 @@ __all__ = [
     "RunningNameServer",
     "add_idl_folder",
     "current_orb",
+    "data_type_of",
     "endpoint_arguments",
     "install",
     "load_idl",
@@ -37,6 +40,7 @@ __all__ = [
 ]
 
 _PLACES: Final = {
+    "_codec": ("IdlDataType", "data_type_of"),
     "_name_server": ("RunningNameServer", "start_name_server"),
     "_naming": ("Binding", "NameServer", "Names", "server_address", "split_path"),
     "_orb": ("Orb", "current_orb", "endpoint_arguments", "start_orb"),

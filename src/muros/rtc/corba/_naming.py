@@ -23,7 +23,7 @@ from muros.rtc.codes import PeerLostError, RtcError
 from muros.rtc.corba._lost import LOST, describe
 from muros.rtc.corba._orb import Orb
 
-__all__ = ["Binding", "NameServer", "Names", "server_address", "split_path"]
+__all__ = ["Binding", "NameServer", "Names", "is_same", "lives", "server_address", "split_path"]
 
 DEFAULT_PORT: Final = 2809
 """TCP port of a name server whose address has none."""
@@ -229,7 +229,7 @@ class Names:
             reference = self._wanted.pop(path, None)
         for server in self.servers:
             with self._at(server):
-                if _is_same(server.resolve(path), reference):
+                if is_same(server.resolve(path), reference):
                     server.unbind(path)
 
     def unbind_all(self) -> None:
@@ -245,7 +245,7 @@ class Names:
                 with self._at(server):
                     bound = server.resolve(path)
                     answered = True
-                    if _is_same(bound, reference):
+                    if is_same(bound, reference):
                         continue
                     if bound is None or not self._tell_taken(server, path, reference, "the name stays there"):
                         server.bind(path, reference)
@@ -255,7 +255,7 @@ class Names:
     def _tell_taken(self, server: NameServer, path: str, reference: Any, outcome: str) -> bool:
         """Whether a living object of another process has the name."""
         bound = server.resolve(path)
-        if bound is None or _is_same(bound, reference) or not _lives(bound):
+        if bound is None or is_same(bound, reference) or not lives(bound):
             return False
         self._report(
             Finding(
@@ -309,7 +309,8 @@ def _components(path: str) -> list[Any]:
     return [CosNaming.NameComponent(name, kind) for name, kind in split_path(path)]
 
 
-def _is_same(one: Any | None, other: Any | None) -> bool:
+def is_same(one: Any | None, other: Any | None) -> bool:
+    """Whether two references, either of which may be nil, lead to the same object. Nobody is called."""
     if one is None or other is None:
         return one is other
     try:
@@ -318,7 +319,8 @@ def _is_same(one: Any | None, other: Any | None) -> bool:
         return False
 
 
-def _lives(reference: Any) -> bool:
+def lives(reference: Any) -> bool:
+    """Whether the object of a reference exists: asked of its process."""
     try:
         return not reference._non_existent()
     except CORBA.Exception:
