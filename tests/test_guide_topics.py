@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.test_guides import Running, programs
+from tests.test_guides import Guided, programs
 
 LINES = {
     ("docs/topics.md", 0): ["True", "0.5 0.0"],
@@ -16,12 +16,12 @@ LINES = {
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Iterator[Callable[[str, int], Running]]:
+def run(tmp_path: Path) -> Iterator[Callable[[str, int], Guided]]:
     """Runs a program of a document."""
-    started: list[Running] = []
+    started: list[Guided] = []
 
-    def start(document: str, number: int) -> Running:
-        started.append(Running(programs(document)[number], 0, tmp_path))
+    def start(document: str, number: int) -> Guided:
+        started.append(Guided(programs(document)[number], 0, tmp_path))
         return started[-1]
 
     yield start
@@ -30,7 +30,7 @@ def run(tmp_path: Path) -> Iterator[Callable[[str, int], Running]]:
 
 
 @pytest.mark.parametrize(("document", "number"), LINES)
-def test_it_prints_what_it_must(run: Callable[[str, int], Running], document: str, number: int) -> None:
+def test_it_prints_what_it_must(run: Callable[[str, int], Guided], document: str, number: int) -> None:
     running = run(document, number)
     assert running.end() == (0, "")
     assert running.lines == LINES[document, number]

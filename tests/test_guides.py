@@ -3,9 +3,7 @@
 import os
 import re
 import signal
-import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -18,6 +16,7 @@ from muros.client import CONNECTED, Session, Udp
 from muros.links import UdpLink
 from muros.rclc import Context, Executor, Node
 from tests.client.agent_thread import RunningAgent
+from tests.running import Running
 
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32, String
@@ -41,46 +40,14 @@ def programs(document: str) -> list[str]:
     return re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-class Running:
-    """A program of a document as a process, and what it prints."""
+class Guided(Running):
+    """A program of a document as a process."""
 
     def __init__(self, source: str, port: int, folder: Path) -> None:
         source = re.sub(r'"192\.168\.\d+\.\d+"', '"127.0.0.1"', source).replace("8888", str(port))
         script = folder / "program.py"
         script.write_text(source)
-        self.lines: list[str] = []
-        self.process = subprocess.Popen(
-            [sys.executable, "-u", str(script)],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "HOME": str(folder)},
-        )
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self) -> None:
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip("\n"))
-
-    def end(self, number: int | None = None) -> tuple[int, str]:
-        """Waits for its end, with a signal first if one is given; its status and what it said on standard error."""
-        if number is not None:
-            self.process.send_signal(number)
-        status = self.process.wait(PATIENCE)
-        self._reader.join(PATIENCE)
-        assert self.process.stderr is not None
-        return status, self.process.stderr.read()
-
-    def stop(self) -> None:
-        """Ends it whatever happened."""
-        self.process.kill()
-        self.process.wait()
-        self._reader.join(PATIENCE)
-        for stream in (self.process.stdout, self.process.stderr):
-            assert stream is not None
-            stream.close()
+        super().__init__([sys.executable, "-u", str(script)], {**os.environ, "HOME": str(folder)})
 
 
 class Bench:
@@ -98,7 +65,7 @@ class Bench:
 
     def start(self, document: str, number: int) -> Running:
         """Starts a program of a document."""
-        running = Running(programs(document)[number], self.link.port, self._folder)
+        running = Guided(programs(document)[number], self.link.port, self._folder)
         self.running.append(running)
         return running
 
@@ -150,7 +117,7 @@ def test_the_thermometer_of_the_readme(bench: Bench) -> None:
 
 def test_the_agent_of_the_readme(tmp_path: Path) -> None:
     with free_port() as port:
-        running = Running(programs("README.md")[1], port, tmp_path)
+        running = Guided(programs("README.md")[1], port, tmp_path)
     session = Session(Udp("127.0.0.1", port), client_key=0xCAFE, retry=100)
     session.on_problem = lambda code, text: None  # until it listens
     try:
@@ -232,7 +199,7 @@ def test_types(number: int, tmp_path: Path) -> None:
             flags=re.MULTILINE,
         )
         assert source.count("assert") == 5
-    running = Running(source, 0, tmp_path)
+    running = Guided(source, 0, tmp_path)
     try:
         assert running.end() == (0, "")
     finally:

@@ -8,6 +8,7 @@ import pytest
 from muros.interfaces import board as boards
 from tests.dds.domains import free_domain
 from tests.examples.stage import TYPES, Stage
+from tests.micropython.runtimes import require
 
 
 @pytest.fixture(scope="module")
@@ -25,3 +26,12 @@ def stage(board: Path) -> Iterator[Stage]:
         made = Stage(board, domain)
         yield made
         made.close()
+
+
+@pytest.fixture(params=["python", "micropython"])
+def on(request: pytest.FixtureRequest) -> str:
+    """An interpreter."""
+    if request.param == "micropython":
+        require("unix")
+    name: str = request.param
+    return name

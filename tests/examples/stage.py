@@ -2,9 +2,7 @@
 
 import os
 import signal
-import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -14,12 +12,10 @@ from muros.links import Link, UdpLink
 from tests.client.agent_thread import RunningAgent
 from tests.dds.domains import Domain
 from tests.micropython.runtimes import UNIX
+from tests.running import PATIENCE, Running
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
-PATIENCE = 30.0
-"""Seconds until what must come has come."""
-
 TYPES = (
     "std_msgs/msg/Int32",
     "std_msgs/msg/String",
@@ -39,45 +35,17 @@ TYPES = (
 """What the examples import on boards."""
 
 
-class Program:
+class Program(Running):
     """An example that runs, and what it prints."""
 
     def __init__(self, name: str, words: list[str], environment: dict[str, str], micropython: bool) -> None:
         self.name = name
         interpreter = [str(UNIX)] if micropython else [sys.executable, "-u"]
-        self.lines: list[str] = []
-        self.process = subprocess.Popen(
-            [*interpreter, str(EXAMPLES / f"{name}.py"), *words],
-            env=environment,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self) -> None:
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip("\r\n"))
+        super().__init__([*interpreter, str(EXAMPLES / f"{name}.py"), *words], environment)
 
     def ends(self, number: int | None = None) -> None:
         """Waits for its end, with a signal first if one is given; it ends well and has complained of nothing."""
-        if number is not None:
-            self.process.send_signal(number)
-        status = self.process.wait(PATIENCE)
-        self._reader.join(PATIENCE)
-        assert self.process.stderr is not None
-        assert (status, self.process.stderr.read()) == (0, ""), self.lines
-
-    def kill(self) -> None:
-        """Ends it whatever happened."""
-        self.process.kill()
-        self.process.wait()
-        self._reader.join(PATIENCE)
-        for stream in (self.process.stdout, self.process.stderr):
-            assert stream is not None
-            stream.close()
+        assert self.end(number) == (0, ""), self.lines
 
 
 class Stage:
@@ -130,7 +98,7 @@ class Stage:
     def close(self) -> None:
         """Ends them all."""
         for program in self.programs:
-            program.kill()
+            program.stop()
         if self.running is not None:
             self.running.stop()
 

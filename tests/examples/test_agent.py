@@ -3,22 +3,8 @@
 import re
 from datetime import UTC, datetime
 
-import pytest
-
 from muros.links import DiscoveryLink
 from tests.examples.stage import Stage, interrupt
-from tests.micropython.runtimes import require
-
-ON = ["python", "micropython"]
-
-
-@pytest.fixture(params=ON)
-def on(request: pytest.FixtureRequest) -> str:
-    """An interpreter."""
-    if request.param == "micropython":
-        require("unix")
-    name: str = request.param
-    return name
 
 
 def test_ping(stage: Stage, on: str) -> None:

@@ -5,8 +5,9 @@ import pytest
 from muros.client import Udp
 from muros.rclc import Context, ParameterClient, ParameterRejectedError
 from tests.cli.shell import Shell
-from tests.examples.stage import PATIENCE, Stage, interrupt
+from tests.examples.stage import Stage, interrupt
 from tests.micropython.runtimes import require
+from tests.running import PATIENCE
 
 
 @pytest.mark.parametrize(

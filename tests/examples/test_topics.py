@@ -148,7 +148,7 @@ def test_a_way_that_is_none(stage: Stage, on: str, words: list[str]) -> None:
     program = stage.start("hello_world", *words, on=on)
     assert program.process.wait(30) == 2
     stage.programs.clear()
-    program.kill()
+    program.stop()
     assert program.lines[0].startswith("usage: ")
     assert len(program.lines) == 1
 
@@ -158,5 +158,5 @@ def test_a_board_has_no_space_of_its_own(stage: Stage) -> None:
     program = stage.start("hello_world", "local:", on="micropython")
     assert program.process.wait(30) == 2
     stage.programs.clear()
-    program.kill()
+    program.stop()
     assert program.lines[0].startswith("usage: ")

@@ -1,25 +1,12 @@
 """The examples of streaming and diagnostics print what they say."""
 
-import pytest
-
 from muros.client import Session, Udp
 from muros.diagnostics import Bridge, Table
 from muros.rclc import Context, Executor
-from tests.examples.stage import PATIENCE, Stage
-from tests.micropython.runtimes import require
+from tests.examples.stage import Stage
+from tests.running import PATIENCE
 
 from std_msgs.msg import UInt8MultiArray
-
-ON = ["python", "micropython"]
-
-
-@pytest.fixture(params=ON)
-def on(request: pytest.FixtureRequest) -> str:
-    """An interpreter."""
-    if request.param == "micropython":
-        require("unix")
-    name: str = request.param
-    return name
 
 
 def test_a_streamed_image(stage: Stage, on: str) -> None:

@@ -1,9 +1,7 @@
 """The ROS 2 graph between processes: programs straight in it, and boards behind an agent that is in it."""
 
 import asyncio
-import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -17,6 +15,7 @@ from muros.agent import Agent
 from muros.client import Udp
 from muros.links import UdpLink
 from muros.rclc import Context, Executor, Node
+from tests.running import Running
 
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32
@@ -26,25 +25,11 @@ PATIENCE = 20.0
 """Seconds until what must come has come."""
 
 
-class Process:
+class Process(Running):
     """A ping-pong process and its lines."""
 
     def __init__(self, *words: str) -> None:
-        self.lines: list[str] = []
-        self.process = subprocess.Popen(
-            [sys.executable, "-u", str(PING_PONG), *words, "0.1"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=dict(os.environ),
-        )
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
-
-    def _read(self) -> None:
-        assert self.process.stdout is not None
-        for line in self.process.stdout:
-            self.lines.append(line.rstrip())
+        super().__init__([sys.executable, "-u", str(PING_PONG), *words, "0.1"])
 
     def pongs(self) -> int:
         """Answers it has heard to its own pings."""
@@ -52,20 +37,7 @@ class Process:
 
     def interrupt(self) -> tuple[int, str]:
         """Ctrl-C; its status and what it said on standard error."""
-        self.process.send_signal(signal.SIGINT)
-        status = self.process.wait(PATIENCE)
-        self._reader.join(PATIENCE)
-        assert self.process.stderr is not None
-        return status, self.process.stderr.read()
-
-    def stop(self) -> None:
-        """Ends it whatever happened."""
-        self.process.kill()
-        self.process.wait()
-        self._reader.join(PATIENCE)
-        for stream in (self.process.stdout, self.process.stderr):
-            assert stream is not None
-            stream.close()
+        return self.end(signal.SIGINT)
 
 
 @pytest.fixture
