@@ -17,7 +17,7 @@ def test_every_measure_has_its_row(tmp_path: Path) -> None:
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=55, check=False)
     assert done.returncode == 0, done.stderr
     rows = json.loads(file.read_text())
-    assert len(rows) == 2 * 13 + 3
+    assert len(rows) == 2 * 15 + 3
     for row in rows:
         if row["what"].endswith(" up") and "delivered" in row:
             assert row["delivered"] == 1
