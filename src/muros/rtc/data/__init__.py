@@ -37,6 +37,7 @@ from muros.rtc.data._transports import (
 from muros.rtc.data._types import ANY_TYPE, AnyDataType, DataError, DataType, same_type, type_label
 from muros.rtc.data.in_port import DataInPort
 from muros.rtc.data.out_port import DataOutPort
+from muros.rtc.data.space import register_space
 
 __all__ = [
     "ANY_TYPE",
@@ -79,3 +80,5 @@ __all__ = [
     "stamp",
     "type_label",
 ]
+
+register_space()

@@ -150,7 +150,7 @@ class DataPort(Port, Generic[T]):
 
     def codec_for(self, options: Mapping[str, str], marshaling: str) -> AnyDataType | None:
         """The serializer for a connection with these effective properties. For ports that take `any` type."""
-        return codec_of(self.data_type, marshaling)
+        return codec_of(self.data_type, marshaling, options)
 
     # ---- for the two kinds
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final, Protocol
 
 from muros.rtc.data._types import AnyDataType, type_label
@@ -18,8 +19,10 @@ class Serializers(Protocol):
     def names(self, data_type: AnyDataType) -> tuple[str, ...]:
         """Those that a port of this data type tells tools of."""
 
-    def codec(self, data_type: AnyDataType, marshaling: str) -> AnyDataType | None:
-        """The one of that name, None where this family has none."""
+    def codec(
+        self, data_type: AnyDataType, marshaling: str, options: Mapping[str, str]
+    ) -> AnyDataType | None:
+        """The one of that name, None where this family has none. `options`: the connection's effective properties."""
 
 
 _NAMED: Final[dict[tuple[str, str], AnyDataType]] = {}
@@ -37,14 +40,17 @@ def register_serializers(family: Serializers) -> None:
         _FAMILIES.append(family)
 
 
-def codec_of(data_type: AnyDataType, marshaling: str) -> AnyDataType | None:
+def codec_of(data_type: AnyDataType, marshaling: str, options: Mapping[str, str] = {}) -> AnyDataType | None:
     """The serializer of that name, None where there is none."""
     if marshaling == CDR:
         return data_type
     named = _NAMED.get((marshaling, type_label(data_type.repository_id)))
     if named is not None:
         return named
-    return next((codec for family in _FAMILIES if (codec := family.codec(data_type, marshaling))), None)
+    for family in _FAMILIES:
+        if (codec := family.codec(data_type, marshaling, options)) is not None:
+            return codec
+    return None
 
 
 def marshaling_types(data_type: AnyDataType) -> tuple[str, ...]:
