@@ -18,11 +18,11 @@ PROGRAM = """
 import sys
 from muros.client import Udp
 from muros.rclc import CapacityError, Context, DiagnosticUpdater, Executor
-from muros.rclc.diagnostics import ERROR, WARN
+from muros.rclc.diagnostics import FAILED, WARN
 
 context = Context(Udp("127.0.0.1", int(sys.argv[1])))
 told = []
-context.on_problem(lambda code, text: told.append(text) if code == 21 else None)
+context.on_problem(lambda code, text: told.append(text) if code == FAILED else None)
 updater = DiagnosticUpdater(context.node("board"), tasks=2)
 executor = Executor(context)
 
