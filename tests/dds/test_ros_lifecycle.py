@@ -11,6 +11,7 @@ from muros.rclc.lifecycle_states import STATES, TRANSITIONS
 from tests.cli.shell import Shell
 from tests.dds.domains import Domain, free_domain
 from tests.dds.peers import PROGRAMS, Peer, start
+from tests.rclc_space.test_lifecycle import STEPS
 from tests.rclc_space.test_ros import Program
 
 PATIENCE = 15.0
@@ -94,17 +95,8 @@ def test_ros_moves_a_node_of_ours(ros: Peer, domain: Domain) -> None:
         assert change(id=7) is True
         assert ask("get_state")["current_state"] == {"id": 4, "label": "finalized"}
         assert called == ["configure", "activate", "shutdown"]
-        told = ros.do("take", subscription=events, count=8)
-        assert [(event["start_state"]["label"], event["goal_state"]["label"]) for event in told] == [
-            ("unconfigured", "configuring"),
-            ("configuring", "inactive"),
-            ("inactive", "activating"),
-            ("activating", "active"),
-            ("active", "deactivating"),
-            ("deactivating", "active"),
-            ("active", "shuttingdown"),
-            ("shuttingdown", "finalized"),
-        ]
+        told = ros.do("take", subscription=events, count=len(STEPS))
+        assert [(event["start_state"]["label"], event["goal_state"]["label"]) for event in told] == STEPS
         assert [event["transition"]["id"] for event in told] == [1, 10, 3, 30, 4, 41, 7, 50]
         assert [text for text in program.problems if "there is no transition 3 from here" in text]
     finally:

@@ -1,5 +1,5 @@
-"""The ways that diagnostics go."""
+"""The ways that diagnostics go, and whom they meet there."""
 
-from tests.rclc_space.conftest import dds_url, stage
+from tests.rclc_space.conftest import dds_url, ros, stage, way
 
-__all__ = ["dds_url", "stage"]
+__all__ = ["dds_url", "ros", "stage", "way"]

@@ -1,24 +1,14 @@
 """ROS 2's own tools hear what the bridge says: rclpy with its diagnostic_msgs."""
 
-from collections.abc import Iterator
-
 import pytest
 
 from muros.diagnostics import Bridge, read_table_untrusted
 from muros.rclc import DiagnosticUpdater
 from muros.rclc.diagnostics import WARN, Task
 from tests.dds.domains import free_domain
-from tests.dds.peers import Peer, require, start
+from tests.dds.peers import Peer
 from tests.diagnostics.test_bridge import TABLE
 from tests.rclc_space.ways import Direct, Stage
-
-
-@pytest.fixture(params=["jazzy", "kilted"])
-def ros(request: pytest.FixtureRequest) -> Iterator[Peer]:
-    """A ROS 2 process."""
-    require(request.param)
-    with start(request.param, discovery="localhost") as peer:
-        yield peer
 
 
 def test_d6_rclpy_hears_words(ros: Peer, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,14 +6,11 @@ from typing import Any
 
 import pytest
 
-from muros.client import Udp
 from muros.interfaces import board
-from muros.links import UdpLink
-from muros.rclc import Context, Executor, LifecycleClient
-from tests.client.agent_thread import RunningAgent
+from muros.rclc import Executor, LifecycleClient
 from tests.micropython.runtimes import ROOT, require
 from tests.micropython.unix import run_mpy
-from tests.rclc_space.ways import PATIENCE, Stage, Way
+from tests.rclc_space.ways import PATIENCE, Stage, ThroughAgent
 
 KINDS = ("ChangeState", "GetState", "GetAvailableStates", "GetAvailableTransitions")
 TYPES = ["lifecycle_msgs/msg/TransitionEvent", *(f"lifecycle_msgs/srv/{kind}" for kind in KINDS)]
@@ -72,24 +69,6 @@ while not answers:
 print(answers, client.state())
 context.close()
 """
-
-
-class ThroughAgent(Way):
-    """Programs on hosts beside the board."""
-
-    direct = False
-
-    def __init__(self) -> None:
-        self.link = UdpLink(0, "127.0.0.1")
-        self._agent = RunningAgent(self.link)
-
-    def open(self) -> Context:
-        """A new context."""
-        return Context(Udp("127.0.0.1", self.link.port))
-
-    def close(self) -> None:
-        """Stops the agent."""
-        self._agent.stop()
 
 
 class Board:

@@ -59,6 +59,15 @@ class Topics:
         return lambda message: self.got.append((topic, None if message is None else message.data))
 
 
+def refused(context: Context, use: Callable[[Context], object], kind: type[Exception], said: str) -> None:
+    """What makes no sense is said in one line, with the return code of the C library."""
+    with pytest.raises(kind) as caught:
+        use(context)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert getattr(caught.value, "code", None) == 11
+
+
 REFUSED: list[tuple[Callable[[Context], object], type[Exception], str]] = [
     (lambda c: Executor(FIVE), TypeError, "Executor needs a context, not 5"),
     (lambda c: Executor(c, -1), ValueError, "handles is -1: it must be how many may be added"),
@@ -80,11 +89,7 @@ REFUSED: list[tuple[Callable[[Context], object], type[Exception], str]] = [
 def test_x1_init_refuses_what_makes_no_sense(
     bench: Bench, use: Callable[[Context], object], kind: type[Exception], said: str
 ) -> None:
-    with pytest.raises(kind) as caught:
-        use(bench.context)
-    assert said in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert getattr(caught.value, "code", None) == 11
+    refused(bench.context, use, kind, said)
 
 
 def test_x1_init(bench: Bench) -> None:
@@ -812,10 +817,7 @@ MISUSED: list[tuple[Callable[[Context], object], type[Exception], str]] = [
 def test_wrong_use_has_the_code_of_the_c_library(
     local: InSpace, use: Callable[[Context], object], kind: type[Exception], said: str
 ) -> None:
-    with pytest.raises(kind) as caught:
-        use(local.context)
-    assert said in str(caught.value)
-    assert getattr(caught.value, "code", None) == 11
+    refused(local.context, use, kind, said)
 
 
 def test_errors_bear_the_codes_of_the_c_library() -> None:

@@ -4,8 +4,11 @@ from collections.abc import Iterator
 
 import pytest
 
+from muros.rclc import Context
 from tests.dds.domains import free_domain
-from tests.rclc_space.ways import Direct, Stage, ThroughAgent
+from tests.dds.peers import Peer, require, start
+from tests.rclc_space.crew import Crew
+from tests.rclc_space.ways import Direct, Stage, ThroughAgent, Way
 
 WAYS = ["agent", "local", "dds"]
 
@@ -28,13 +31,41 @@ def url(request: pytest.FixtureRequest) -> str:
 
 
 @pytest.fixture(params=WAYS)
-def stage(request: pytest.FixtureRequest) -> Iterator[Stage]:
-    """A stage on each of the ways."""
+def way(request: pytest.FixtureRequest) -> Way:
+    """Each of the ways; a stage or a crew closes it."""
     if request.param == "agent":
-        made = Stage(ThroughAgent())
-    elif request.param == "local":
-        made = Stage(Direct("local:"))
-    else:
-        made = Stage(Direct(request.getfixturevalue("dds_url")))
+        return ThroughAgent()
+    return Direct("local:" if request.param == "local" else request.getfixturevalue("dds_url"))
+
+
+@pytest.fixture
+def stage(way: Way) -> Iterator[Stage]:
+    """A stage on each of the ways."""
+    made = Stage(way)
     yield made
     made.close()
+
+
+@pytest.fixture
+def crew(way: Way) -> Iterator[Crew]:
+    """A crew on each of the ways."""
+    made = Crew(way)
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module", params=["jazzy", "kilted"])
+def ros(request: pytest.FixtureRequest) -> Iterator[Peer]:
+    """A ROS 2 process."""
+    require(request.param)
+    with start(request.param, discovery="localhost") as peer:
+        yield peer
+
+
+@pytest.fixture
+def context(dds_url: str, ros: Peer) -> Iterator[Context]:
+    """A context in the domain of a ROS 2 process; what rclpy made goes with it."""
+    made = Context(dds_url)
+    yield made
+    made.close()
+    ros.do("reset")

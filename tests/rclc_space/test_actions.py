@@ -119,6 +119,19 @@ def endless(goal: Goal) -> Iterator[float]:
     goal.canceled(Fibonacci.Result(sequence=[goal.request.order]))
 
 
+def states(stage: Stage) -> list[list[int]]:
+    """What somebody who comes late hears of the states of all goals, from the first array on."""
+    heard: list[list[int]] = []
+    stage.node("late").subscription(
+        GoalStatusArray,
+        "/count/_action/status",
+        lambda array: heard.append([entry.status for entry in array.status_list]),
+        "status",
+    )
+    stage.until(lambda: heard)
+    return heard
+
+
 def test_a1_b1_a_goal_is_accepted(stage: Stage) -> None:
     pair = Pair(stage)
     goal = pair.send(3)
@@ -225,14 +238,7 @@ def test_the_states_are_published_and_a_late_reader_gets_the_last(stage: Stage) 
     pair = Pair(stage, endless)
     goal = pair.send(1)
     pair.until_executing(goal)
-    heard: list[list[int]] = []
-    stage.node("late").subscription(
-        GoalStatusArray,
-        "/count/_action/status",
-        lambda array: heard.append([entry.status for entry in array.status_list]),
-        "status",
-    )
-    stage.until(lambda: heard)
+    heard = states(stage)
     assert heard[0] == [EXECUTING]
     goal.cancel()
     stage.until(lambda: heard[-1] == [CANCELED])
@@ -422,7 +428,7 @@ def test_a_goal_outlives_its_agent() -> None:
     class Way:
         direct = False
 
-        def open(self) -> Context:
+        def open(self, domain_id: int | None = None) -> Context:
             session = Session(Udp("127.0.0.1", link.port), keepalive=100, retry=100)
             context = Context(session)
             context.on_problem(lambda code, text: None)  # that the agent is gone
@@ -447,14 +453,7 @@ def test_a_goal_outlives_its_agent() -> None:
         stage.until(lambda: all(context.state != "CONNECTED" for context in stage.contexts))
         agent = RunningAgent(UdpLink(link.port, "127.0.0.1"))
         stage.until(lambda: all(context.state == "CONNECTED" for context in stage.contexts))
-        heard: list[list[int]] = []
-        stage.node("late").subscription(
-            GoalStatusArray,
-            "/count/_action/status",
-            lambda array: heard.append([entry.status for entry in array.status_list]),
-            "status",
-        )
-        stage.until(lambda: heard)
+        heard = states(stage)
         assert heard[0] == [EXECUTING], "the new agent knows the states"
         released.append(1)
         assert pair.result(goal) == [3]

@@ -14,20 +14,12 @@ import pytest
 
 from muros import interfaces
 from muros.rclc import Context, Executor
-from tests.dds.peers import Peer, require, start
+from tests.dds.peers import Peer
 from tests.rclc_space.ways import PATIENCE
 
 TYPE = "test_msgs/action/Fibonacci"
 FIBONACCI = "int32 order\n---\nint32[] sequence\n---\nint32[] sequence\n"
 CANCELING, SUCCEEDED, CANCELED, ABORTED = 3, 4, 5, 6
-
-
-@pytest.fixture(scope="module", params=["jazzy", "kilted"])
-def ros(request: pytest.FixtureRequest) -> Iterator[Peer]:
-    """A ROS 2 process."""
-    require(request.param)
-    with start(request.param, discovery="localhost") as peer:
-        yield peer
 
 
 @pytest.fixture(scope="module")
@@ -44,15 +36,6 @@ def kind(folder: Path) -> Any:
     """The action of the peers' tests."""
     interfaces.add_path(folder)
     return interfaces.action(TYPE)
-
-
-@pytest.fixture
-def context(dds_url: str, ros: Peer) -> Iterator[Context]:
-    """A context of ours."""
-    made = Context(dds_url)
-    yield made
-    made.close()
-    ros.do("reset")
 
 
 def test_rclpy_sends_goals_to_us(context: Context, ros: Peer, kind: Any, dds_url: str) -> None:

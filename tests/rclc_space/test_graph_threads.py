@@ -1,29 +1,13 @@
 """The graph where several threads run a context: changes reach the thread of their handle, and others may wait."""
 
 import threading
-from collections.abc import Iterator
-from typing import Any
-
-import pytest
 
 from muros.rclc import BEST_EFFORT, CallbackGroup
-from tests.rclc_space.conftest import WAYS
 from tests.rclc_space.crew import Crew, until
-from tests.rclc_space.ways import PATIENCE, Direct, ThroughAgent
+from tests.rclc_space.ways import PATIENCE
 
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32
-
-
-@pytest.fixture(params=WAYS)
-def crew(request: pytest.FixtureRequest) -> Iterator[Crew]:
-    """A crew on each of the ways."""
-    way: Any = ThroughAgent() if request.param == "agent" else None
-    if way is None:
-        way = Direct("local:" if request.param == "local" else request.getfixturevalue("dds_url"))
-    made = Crew(way)
-    yield made
-    made.close()
 
 
 def test_changes_are_told_in_the_thread_of_the_handle(crew: Crew) -> None:

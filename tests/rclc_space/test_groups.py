@@ -26,9 +26,8 @@ from muros.rclc import (
     Threads,
     always,
 )
-from tests.rclc_space.conftest import WAYS
 from tests.rclc_space.crew import Crew, here, until
-from tests.rclc_space.ways import PATIENCE, Direct, ThroughAgent
+from tests.rclc_space.ways import PATIENCE, Direct
 
 from example_interfaces.action import Fibonacci
 from example_interfaces.srv import AddTwoInts
@@ -36,17 +35,6 @@ from std_msgs.msg import Int32
 
 LONG = 60.0
 """Seconds that nobody waits unless a waking was missed: the time limit of the test ends it first."""
-
-
-@pytest.fixture(params=WAYS)
-def crew(request: pytest.FixtureRequest) -> Iterator[Crew]:
-    """A crew on each of the ways."""
-    way: Any = ThroughAgent() if request.param == "agent" else None
-    if way is None:
-        way = Direct("local:" if request.param == "local" else request.getfixturevalue("dds_url"))
-    made = Crew(way)
-    yield made
-    made.close()
 
 
 @pytest.fixture

@@ -12,6 +12,19 @@ LABELS = dict(STATES)
 GRAPH = [(number, label, LABELS[start], LABELS[goal]) for number, label, start, goal in TRANSITIONS]
 
 
+STEPS = [
+    ("unconfigured", "configuring"),
+    ("configuring", "inactive"),
+    ("inactive", "activating"),
+    ("activating", "active"),
+    ("active", "deactivating"),
+    ("deactivating", "active"),
+    ("active", "shuttingdown"),
+    ("shuttingdown", "finalized"),
+]
+"""What is told of a node that is configured, activated, not deactivated, and shut down."""
+
+
 class Mover:
     """A client whose questions are asked in executors."""
 
@@ -57,17 +70,8 @@ def test_a_node_is_moved_from_outside(stage: Stage) -> None:  # B5: all five ser
     assert mover.ask("change", "shutdown") is True
     assert (mover.ask("state"), mover.ask("transitions")) == ("finalized", [])
     assert called[-1] == "shutdown"
-    stage.until(lambda: len(mover.events) == 8)
-    assert mover.events == [
-        ("unconfigured", "configuring"),
-        ("configuring", "inactive"),
-        ("inactive", "activating"),
-        ("activating", "active"),
-        ("active", "deactivating"),
-        ("deactivating", "active"),
-        ("active", "shuttingdown"),
-        ("shuttingdown", "finalized"),
-    ]
+    stage.until(lambda: len(mover.events) == len(STEPS))
+    assert mover.events == STEPS
     assert lifecycle.lost == 0
     mover.client.destroy()
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from muros.rclc import Context, Executor
-from tests.dds.peers import Peer, require, start
+from tests.dds.peers import Peer
 from tests.rclc_space.ways import PATIENCE
 
 from std_msgs.msg import String
@@ -16,14 +16,6 @@ from std_srvs.srv import SetBool
 
 SWITCH = "std_srvs/srv/SetBool"
 STRING = "std_msgs/msg/String"
-
-
-@pytest.fixture(scope="module", params=["jazzy", "kilted"])
-def ros(request: pytest.FixtureRequest) -> Iterator[Peer]:
-    """A ROS 2 process."""
-    require(request.param)
-    with start(request.param, discovery="localhost") as peer:
-        yield peer
 
 
 class Program:

@@ -13,7 +13,7 @@ from muros.links import UdpLink
 from muros.rclc import Context, Executor, RosArguments
 from muros.rclc.host.remapping import remap, remap_node
 from tests.client.agent_thread import RunningAgent
-from tests.dds.peers import Peer, environment, python_of, require, start
+from tests.dds.peers import Peer, environment, python_of, require
 from tests.rclc_space.ways import PATIENCE
 
 from example_interfaces.srv import AddTwoInts
@@ -22,14 +22,6 @@ from std_srvs.srv import Trigger
 
 SETTLE = "rcl_interfaces/srv/SetParameters"
 BOOL = 1
-
-
-@pytest.fixture(scope="module", params=["jazzy", "kilted"])
-def ros(request: pytest.FixtureRequest) -> Iterator[Peer]:
-    """A ROS 2 process."""
-    require(request.param)
-    with start(request.param, discovery="localhost") as peer:
-        yield peer
 
 
 @pytest.fixture

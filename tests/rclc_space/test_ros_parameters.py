@@ -1,7 +1,6 @@
 """Parameters and a node of ROS 2: rclpy asks ours, and we ask rclpy's, with the same answers."""
 
 import threading
-from collections.abc import Iterator
 from itertools import product
 from typing import Any
 
@@ -14,7 +13,7 @@ from muros.rclc import (
     ParameterNotDeclaredError,
     ParameterRejectedError,
 )
-from tests.dds.peers import Peer, require, start
+from tests.dds.peers import Peer
 from tests.rclc_space.ways import PATIENCE
 
 SERVICES = {
@@ -26,23 +25,6 @@ SERVICES = {
     "describe_parameters": "DescribeParameters",
 }
 DOUBLE, INTEGER, STRING = 3, 2, 4
-
-
-@pytest.fixture(scope="module", params=["jazzy", "kilted"])
-def ros(request: pytest.FixtureRequest) -> Iterator[Peer]:
-    """A ROS 2 process."""
-    require(request.param)
-    with start(request.param, discovery="localhost") as peer:
-        yield peer
-
-
-@pytest.fixture
-def context(dds_url: str, ros: Peer) -> Iterator[Context]:
-    """A context of ours; what rclpy made goes with it."""
-    made = Context(dds_url)
-    yield made
-    made.close()
-    ros.do("reset")
 
 
 def test_rclpy_asks_ours(context: Context, ros: Peer, dds_url: str) -> None:

@@ -1,28 +1,17 @@
 """rclpy gets what a board streams through an agent in the ROS 2 graph."""
 
 import zlib
-from collections.abc import Iterator
-
-import pytest
 
 from muros.client import Udp
 from muros.links import UdpLink
 from muros.rclc import Context, Executor, Streamer
 from tests.client.agent_thread import RunningAgent
-from tests.dds.peers import Peer, require, start
+from tests.dds.peers import Peer
 
 from sensor_msgs.msg import Image
 
 SIZE = 200_000
 DATA = bytes(i * 7 & 255 for i in range(SIZE))
-
-
-@pytest.fixture(params=["jazzy", "kilted"])
-def ros(request: pytest.FixtureRequest) -> Iterator[Peer]:
-    """A ROS 2 process."""
-    require(request.param)
-    with start(request.param, discovery="localhost") as peer:
-        yield peer
 
 
 def test_an_image_of_200_kb(ros: Peer, dds_url: str) -> None:

@@ -1,7 +1,6 @@
 """One worker for each subscription: READY and BUSY, its policy, and triggers of several. A7 numbers the facts."""
 
 import threading
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -10,22 +9,10 @@ from muros.client import Qos
 from muros.rclc import ThreadError, Workers, any_of
 from muros.rclc.host.workers import WorkerState
 from muros.rclc.scheduling import other
-from tests.rclc_space.conftest import WAYS
 from tests.rclc_space.crew import Crew, here, until
-from tests.rclc_space.ways import PATIENCE, Direct, ThroughAgent
+from tests.rclc_space.ways import PATIENCE, Direct
 
 from std_msgs.msg import Int32
-
-
-@pytest.fixture(params=WAYS)
-def crew(request: pytest.FixtureRequest) -> Iterator[Crew]:
-    """A crew on each of the ways."""
-    way: Any = ThroughAgent() if request.param == "agent" else None
-    if way is None:
-        way = Direct("local:" if request.param == "local" else request.getfixturevalue("dds_url"))
-    made = Crew(way)
-    yield made
-    made.close()
 
 
 def spun(crew: Crew, node: Any) -> Any:

@@ -32,12 +32,12 @@ class ThroughAgent:
     direct = False
 
     def __init__(self) -> None:
-        self._link = UdpLink(0, "127.0.0.1")
-        self._agent = RunningAgent(self._link)
+        self.link = UdpLink(0, "127.0.0.1")
+        self._agent = RunningAgent(self.link)
 
     def transport(self) -> Udp:
         """A board's way to the agent."""
-        return Udp("127.0.0.1", self._link.port)
+        return Udp("127.0.0.1", self.link.port)
 
     def open(self, domain_id: int | None = None) -> Context:
         """A new context, in domain 0 or another."""
