@@ -566,6 +566,7 @@ def test_observers_hear_of_all_and_one_that_fails_harms_nobody(stage: Stage) -> 
     assert context.set_rate(10.0) is OK
     assert context.stop() is OK
     assert [event.kind for event in stage.events] == [
+        ContextEventKind.ADMITTED,
         ContextEventKind.STARTUP,
         ContextEventKind.STATE_CHANGED,
         ContextEventKind.RATE_CHANGED,

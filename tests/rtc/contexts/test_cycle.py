@@ -209,14 +209,17 @@ def test_observers_are_told_of_changes_once_each() -> None:
     stage.ask(actor, Ask.RESET)
     stage.cycle.rate_changed()
     stage.cycle.shutdown()
+    stage.cycle.dismiss(stage.member(actor), running=False)
     assert [event.kind for event in stage.events] == [
+        ContextEventKind.ADMITTED,
         ContextEventKind.STARTUP,
         ContextEventKind.STATE_CHANGED,
         ContextEventKind.STATE_CHANGED,
         ContextEventKind.RATE_CHANGED,
         ContextEventKind.SHUTDOWN,
+        ContextEventKind.DISMISSED,
     ]
-    failed, reset = stage.events[1:3]
+    failed, reset = stage.events[2:4]
     assert (failed.component, failed.old, failed.new) == (
         actor, LifeCycleState.INACTIVE_STATE, LifeCycleState.ERROR_STATE,
     )  # fmt: skip

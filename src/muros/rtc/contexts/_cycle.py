@@ -119,6 +119,7 @@ class Cycle:
     def admit(self, member: Member) -> None:
         """A component joins, inactive."""
         self.members = (*self.members, member)
+        self._tell(ContextEvent(ContextEventKind.ADMITTED, member.participant, member.handle))
 
     def dismiss(self, member: Member, *, running: bool) -> None:
         """A component goes, as one that is deactivated and whose context stops. Nothing where it has gone already."""
@@ -130,6 +131,7 @@ class Cycle:
         if not member.owner:
             self._call(member, "detach_context")
         self.members = tuple(other for other in self.members if other is not member)
+        self._tell(ContextEvent(ContextEventKind.DISMISSED, member.participant, member.handle))
 
     # a pass
 

@@ -63,6 +63,8 @@ class ContextEventKind(Enum):
     SHUTDOWN = "shutdown"
     RATE_CHANGED = "rate changed"
     STATE_CHANGED = "state changed"
+    ADMITTED = "admitted"
+    DISMISSED = "dismissed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,7 @@ class ContextEvent:
 
     kind: ContextEventKind
     component: Participant | None = None
-    """Whose state changed; None where the event is the context's own."""
+    """Whose state changed, or who came or went; None where the event is the context's own."""
     handle: int = -1
     """By which the component knows the context."""
     old: LifeCycleState | None = None
