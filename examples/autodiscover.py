@@ -13,10 +13,10 @@ With a host's name or address as its argument it asks there, and not the whole n
 
 import sys
 
+from counting import count_up
+
 from muros.client import Udp, discover
 from muros.rclc import Context, Executor
-
-from std_msgs.msg import Int32
 
 hosts = sys.argv[1:2]
 port = int(sys.argv[2]) if len(sys.argv) > 2 else 7400
@@ -29,16 +29,5 @@ print("found an agent at", host + ":" + str(port))
 
 context = Context(Udp(host, port))
 node = context.node("autodiscover")
-publisher = node.publisher(Int32, "int32")
-message = Int32(data=0)
-
-
-def send() -> None:
-    """Publishes a number."""
-    if publisher.publish(message):
-        print("Sent:", message.data)
-        message.data += 1
-
-
-node.timer(0.2, send)
+count_up(node)
 Executor(context).spin()

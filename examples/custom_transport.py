@@ -13,10 +13,10 @@ no messages, only bytes.
 import socket
 import sys
 
+from counting import count_up
+
 from muros.client import Custom
 from muros.rclc import Context, Executor
-
-from std_msgs.msg import Int32
 
 place = socket.getaddrinfo(sys.argv[1], int(sys.argv[2]))[0][-1]
 wires: "list[socket.socket]" = []
@@ -53,16 +53,5 @@ def read(buf: bytearray) -> int:
 
 context = Context(Custom(open_wire, close_wire, write, read))
 node = context.node("custom_transport")
-publisher = node.publisher(Int32, "int32")
-message = Int32(data=0)
-
-
-def send() -> None:
-    """Publishes a number."""
-    if publisher.publish(message):
-        print("Sent:", message.data)
-        message.data += 1
-
-
-node.timer(0.2, send)
+count_up(node)
 Executor(context).spin()

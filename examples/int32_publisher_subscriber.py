@@ -8,6 +8,7 @@ prints
     Received: 0
 """
 
+from counting import count_up
 from way import open_context
 
 from muros.rclc import Executor
@@ -16,17 +17,6 @@ from std_msgs.msg import Int32
 
 context = open_context()
 node = context.node("int32_publisher_subscriber")
-publisher = node.publisher(Int32, "int32")
-message = Int32(data=0)
-
-
-def send() -> None:
-    """Publishes the number."""
-    if publisher.publish(message):
-        print("Sent:", message.data)
-        message.data += 1
-
-
+count_up(node)
 node.subscription(Int32, "int32", lambda heard: print("Received:", heard.data))
-node.timer(0.2, send)
 Executor(context).spin()
