@@ -53,13 +53,14 @@ class Buffer(Generic[T]):
         self.ring: Final[Ring[T]] = Ring(options.length, options.full_policy, options.empty_policy)
         self.condition: Final = condition or threading.Condition(threading.Lock())
         self.closed = False
+        self._blocks: Final = options.full_policy is FullPolicy.BLOCK
         self._clock = clock
 
     def write(self, value: T) -> tuple[BufferStatus, bool]:
         """Add `value`: OK, FULL, TIMEOUT, or PRECONDITION_NOT_MET of a closed one; and whether one was overwritten."""
         with self.condition:
             ring = self.ring
-            if ring.full and self.options.full_policy is FullPolicy.BLOCK:
+            if self._blocks and ring.full:
                 status = self.wait(lambda: not ring.full, self.options.write_timeout)
                 if status is not BufferStatus.OK:
                     return status, False

@@ -47,15 +47,13 @@ SENT: Final = {
 }
 """What an InPort's answer means to who wrote to the OutPort."""
 
-SENT_EVENTS: Final = {
-    PortStatus.PORT_OK: DataEvent.ON_RECEIVED,
+REFUSED_EVENTS: Final = {
     PortStatus.BUFFER_FULL: DataEvent.ON_RECEIVER_FULL,
     PortStatus.BUFFER_TIMEOUT: DataEvent.ON_RECEIVER_TIMEOUT,
 }
-"""What the OutPort's listeners hear of an InPort's answer; all others are ON_RECEIVER_ERROR."""
+"""What the OutPort's listeners hear of a refusal; all others are ON_RECEIVER_ERROR."""
 
-RECEIVED: Final = {
-    BufferStatus.OK: (PortStatus.PORT_OK, DataEvent.ON_BUFFER_WRITE, None),
+NOT_TAKEN: Final = {
     BufferStatus.FULL: (PortStatus.BUFFER_FULL, DataEvent.ON_BUFFER_FULL, DataEvent.ON_RECEIVER_FULL),
     BufferStatus.TIMEOUT: (
         PortStatus.BUFFER_TIMEOUT,
@@ -63,7 +61,7 @@ RECEIVED: Final = {
         DataEvent.ON_RECEIVER_TIMEOUT,
     ),
 }
-"""What an InPort answers, and its listeners hear, when its buffer answered; all others are PORT_ERROR."""
+"""What an InPort answers, and its listeners hear, when its buffer did not take a value; else PORT_ERROR."""
 
 FETCHED: Final = {
     PortStatus.BUFFER_EMPTY: (DataPortStatus.RECV_EMPTY, ConnectorEvent.ON_SENDER_EMPTY),
@@ -109,7 +107,6 @@ class Link:
         self._codec: Final = setup.codec
         self._little: Final = setup.options.little
         self._listeners: Final = setup.listeners
-        self._heard: Final = setup.listeners.data.of
 
     def connected(self) -> None:
         """It stands."""
@@ -127,7 +124,7 @@ class Link:
 
     def tell(self, event: DataEvent, sample: Sample) -> None:
         """Tell who listens; what they change counts for the sample. Nobody: nothing is decoded."""
-        if not self._heard(event):
+        if not self._listeners.hears_values or not self._listeners.hears(event):
             return
         try:
             value = sample.value
@@ -212,8 +209,10 @@ class PushSender(Link):
         super().__init__(setup)
         self._direct: Final = inlet if isinstance(inlet, PushReceiver) else None
         self._inlet: Final = inlet
+        self._put: Final = inlet.put
         self._buffered: Final = setup.options.subscription is not Subscription.FLUSH
         self._stamps_sent: Final = Stamp.ON_SEND in setup.options.stamps
+        self._plain: Final = self._direct is None and not self._buffered and not self._stamps_sent
         self._publisher: Final = make_publisher(
             setup.options, self, name=f"{setup.who} {self._label}", clock=setup.clock
         )
@@ -222,6 +221,15 @@ class PushSender(Link):
         if self.closed:
             return DataPortStatus.PRECONDITION_NOT_MET
         codec, little = self._codec, self._little
+        if self._plain and not self._listeners.hears_values:
+            octets = outgoing.octets(codec, little)
+            try:
+                answer = self._put(octets)
+            except Exception as error:
+                return self._unsent(error, Sample(codec, little, octets))
+            if answer is PortStatus.PORT_OK:
+                return DataPortStatus.PORT_OK
+            return self._answered(answer, Sample(codec, little, octets))
         if self._direct is not None:
             sample = Sample(codec, little, None, copy_value(outgoing.value))
         elif self._buffered:
@@ -237,44 +245,49 @@ class PushSender(Link):
         self.tell(DataEvent.ON_SEND, sample)
         try:
             answer = self._bring(sample)
-        except PeerLostError as error:
+        except Exception as error:
+            return self._unsent(error, sample)
+        return self._answered(answer, sample)
+
+    def _answered(self, answer: PortStatus, sample: Sample) -> DataPortStatus:
+        """What the InPort's answer means."""
+        if answer is PortStatus.PORT_OK:
+            self.tell(DataEvent.ON_RECEIVED, sample)
+            return DataPortStatus.PORT_OK
+        self.refused += 1
+        if _is_power_of_ten(self.refused):
+            self._find(
+                "values-refused",
+                f"{self.refused} values of connection {self._label} not taken by the receiver",
+                f"it answered {answer.name}",
+                "have it read oftener, or connect with a longer buffer or another full_policy",
+            )
+        self.tell(REFUSED_EVENTS.get(answer, DataEvent.ON_RECEIVER_ERROR), sample)
+        return SENT[answer]
+
+    def _unsent(self, error: Exception, sample: Sample) -> DataPortStatus:
+        """It could not be brought to the InPort."""
+        if isinstance(error, PeerLostError):
             self.lost_sight(error)
             return DataPortStatus.CONNECTION_LOST
-        except Exception as error:
-            self._failed(error)
-            self.tell(DataEvent.ON_RECEIVER_ERROR, sample)
-            return DataPortStatus.UNKNOWN_ERROR
-        if answer is not PortStatus.PORT_OK:
-            self.refused += 1
-            if _is_power_of_ten(self.refused):
-                self._find(
-                    "values-refused",
-                    f"{self.refused} values of connection {self._label} not taken by the receiver",
-                    f"it answered {answer.name}",
-                    "have it read oftener, or connect with a longer buffer or another full_policy",
-                )
-        self.tell(SENT_EVENTS.get(answer, DataEvent.ON_RECEIVER_ERROR), sample)
-        return SENT[answer]
+        self._find(
+            "send-failed", f"a value of connection {self._label} not sent", f"{type(error).__name__}: {error}"
+        )
+        self.tell(DataEvent.ON_RECEIVER_ERROR, sample)
+        return DataPortStatus.UNKNOWN_ERROR
 
     def _bring(self, sample: Sample) -> PortStatus:
         if self._direct is None:
-            assert not isinstance(self._inlet, PushReceiver)
-            return self._inlet.put(sample.octets)
+            return self._put(sample.octets)
         if self._direct.closed:
             raise PeerLostError("the InPort of this process has let go of the connection")
         # A publisher with a buffer may send a value again: what the receiver gets is its own.
         value = sample.hand_out() if self._buffered else sample.value
         return self._direct.receive(Sample(self._codec, self._little, None, value))
 
-    def _failed(self, error: Exception) -> None:
-        self._find(
-            "send-failed", f"a value of connection {self._label} not sent", f"{type(error).__name__}: {error}"
-        )
-
     def _end(self) -> None:
         self._publisher.close()
-        if self._direct is None:
-            assert not isinstance(self._inlet, PushReceiver)
+        if not isinstance(self._inlet, PushReceiver):
             self._inlet.close()
 
 
@@ -342,6 +355,8 @@ class InLink(Link):
             setup.options.buffer, condition=condition, clock=setup.clock
         )
         self._arrivals: Final = arrivals
+        self._stamps_received: Final = Stamp.ON_RECEIVED in setup.options.stamps
+        self._stamps_read: Final = Stamp.ON_READ in setup.options.stamps
 
     def is_new(self) -> bool:
         """Whether a value can be read that was not read before."""
@@ -356,7 +371,7 @@ class InLink(Link):
     def hand_out(self, sample: Sample) -> object:
         """The value, for the user. DataError, counted and told, for malformed octets."""
         try:
-            if Stamp.ON_READ in self.options.stamps:
+            if self._stamps_read:
                 self._stamp(sample)
             return sample.hand_out()
         except DataError as error:
@@ -385,21 +400,26 @@ class PushReceiver(InLink):
         """Store a value. Never raises."""
         if self.closed:
             return PortStatus.PORT_ERROR
-        if Stamp.ON_RECEIVED in self.options.stamps:
+        heard = self._listeners.hears_values
+        if self._stamps_received:
             self._stamp(sample)
-        self.tell(DataEvent.ON_RECEIVED, sample)
+        if heard:
+            self.tell(DataEvent.ON_RECEIVED, sample)
         sample.order = next(self._arrivals)
         stored, overwrote = self.buffer.write(sample)
-        if stored is BufferStatus.PRECONDITION_NOT_MET:
+        if stored is BufferStatus.OK:
+            if heard:
+                self.tell(DataEvent.ON_BUFFER_WRITE, sample)
+            if overwrote:
+                self.overwrote()
+                self.tell(DataEvent.ON_BUFFER_OVERWRITE, sample)
+            return PortStatus.PORT_OK
+        if stored not in NOT_TAKEN:
             return PortStatus.PORT_ERROR
-        answer, event, more = RECEIVED[stored]
-        self.tell(event, sample)
-        if overwrote:
-            self.overwrote()
-            self.tell(DataEvent.ON_BUFFER_OVERWRITE, sample)
-        if more is not None:
-            self.refused += 1
-            self.tell(more, sample)
+        self.refused += 1
+        answer, *events = NOT_TAKEN[stored]
+        for event in events:
+            self.tell(event, sample)
         return answer
 
 
@@ -442,7 +462,7 @@ class PullFetcher(InLink):
             self.tell_connector(event)
             return status, None
         sample = self._sample(octets)
-        if Stamp.ON_RECEIVED in self.options.stamps:
+        if self._stamps_received:
             self._stamp(sample)
         self.tell(DataEvent.ON_RECEIVED, sample)
         self.tell(DataEvent.ON_BUFFER_WRITE, sample)

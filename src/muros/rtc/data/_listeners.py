@@ -87,27 +87,35 @@ class DataListeners:
 
     def __init__(self, on_error: Callable[[DataEvent | ConnectorEvent, Exception], object]) -> None:
         self._on_error: Final = on_error
-        self.data: Final = Listeners[DataEvent](on_error)
-        self.connector: Final = Listeners[ConnectorEvent](on_error)
+        self._data: Final = Listeners[DataEvent](on_error)
+        self._connector: Final = Listeners[ConnectorEvent](on_error)
+        self.hears_values = False
+        """Whether anybody listens to any `DataEvent`: asked with every value."""
 
     def add(
         self, event: DataEvent | ConnectorEvent, callback: Callable[..., object]
     ) -> Callable[..., object]:
         """Tell `callback` of `event` from now on. Returns it."""
         if isinstance(event, DataEvent):
-            return self.data.add(event, callback)
-        return self.connector.add(event, callback)
+            added = self._data.add(event, callback)
+            self.hears_values = True
+            return added
+        return self._connector.add(event, callback)
 
     def remove(self, event: DataEvent | ConnectorEvent, callback: Callable[..., object]) -> bool:
         """Tell `callback` no longer. False where it was not there."""
         if isinstance(event, DataEvent):
-            return self.data.remove(event, callback)
-        return self.connector.remove(event, callback)
+            return self._data.remove(event, callback)
+        return self._connector.remove(event, callback)
+
+    def hears(self, event: DataEvent) -> bool:
+        """Whether anybody listens to this one."""
+        return bool(self._data.of(event))
 
     def tell_value(self, event: DataEvent, info: ConnectorInfo, value: object) -> tuple[bool, object]:
         """Tell who listens; whether the value was changed, and the value as it is now."""
         changed = False
-        for callback in self.data.of(event):
+        for callback in self._data.of(event):
             try:
                 answer = callback(info, value)
             except Exception as error:
@@ -123,4 +131,4 @@ class DataListeners:
 
     def tell(self, event: ConnectorEvent, info: ConnectorInfo) -> None:
         """Tell who listens."""
-        self.connector.tell(event, info)
+        self._connector.tell(event, info)

@@ -57,21 +57,22 @@ class Sample:
 
 
 class Outgoing:
-    """A value in a call of write: encoded once for all connectors that want the same octets."""
+    """A value in a call of write: encoded once for all connections that want the same octets."""
 
-    __slots__ = ("_encoded", "value")
+    __slots__ = ("_codec", "_little", "_octets", "value")
 
     def __init__(self, value: Any) -> None:
         self.value = value
-        self._encoded: dict[tuple[int, bool], bytes] = {}
+        self._codec: AnyDataType | None = None
+        self._little = False
+        self._octets = b""
 
     def octets(self, codec: AnyDataType, little: bool) -> bytes:
         """Its octets. DataError where the type cannot hold it."""
-        key = (id(codec), little)
-        octets = self._encoded.get(key)
-        if octets is None:
-            octets = self._encoded[key] = codec.encode(self.value, little)
-        return octets
+        if self._codec is not codec or self._little is not little:
+            self._octets = codec.encode(self.value, little)
+            self._codec, self._little = codec, little
+        return self._octets
 
 
 def copy_value(value: Any) -> Any:
@@ -91,11 +92,16 @@ def copy_value(value: Any) -> Any:
         return bytearray(value)
     if kind is dict:
         return {key: copy_value(one) for key, one in value.items()}
-    members = getattr(value, "__dict__", None)
-    if members is None or hasattr(value, "_is_a"):  # without members to change, or a reference to an object
+    try:
+        members = value.__dict__
+    except AttributeError:
         return value.copy() if hasattr(value, "copy") else value
+    if hasattr(kind, "_is_a"):  # a reference to an object
+        return value
     copied = object.__new__(kind)
-    copied.__dict__.update({name: copy_value(one) for name, one in members.items()})
+    into = copied.__dict__
+    for name, one in members.items():
+        into[name] = one if type(one) in _ATOMS else copy_value(one)
     return copied
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, ClassVar, Final, TypeVar, cast
+from typing import Any, ClassVar, Final, TypeVar
 
 from muros.rtc.codes import BufferStatus, DataPortStatus, PortStatus, PortType, ReturnCode
 from muros.rtc.data._links import InLink, Link, PullFetcher, PullSource, PushReceiver
@@ -77,7 +77,8 @@ class DataInPort(DataPort[T]):
         """
         if self.on_read is not None:
             self._call_back("on_read", self.on_read)
-        status, link, sample = self._take(*self._chosen(connector))
+        pushed, pulled = self._chosen(connector) if connector else (self._pushed, self._pulled)
+        status, link, sample = self._take(pushed, pulled)
         value: Any = None
         if link is not None and sample is not None:
             try:
@@ -92,7 +93,7 @@ class DataInPort(DataPort[T]):
         if self.on_read_convert is not None:
             returned, converted = self._call_back("on_read_convert", self.on_read_convert, value)
             value = converted if returned else value
-        return status, cast("T", value)
+        return status, value
 
     def is_new(self, names: str | Iterable[str] | None = None) -> bool:
         """Whether a value waits that was not read: at any connection, or at those of these names or ids.
@@ -145,12 +146,12 @@ class DataInPort(DataPort[T]):
                 taken[0].tell(DataEvent.ON_BUFFER_READ, taken[1])
                 return DataPortStatus.PORT_OK, *taken
         status = DataPortStatus.PRECONDITION_NOT_MET
-        for link in pulled:
-            status, sample = link.fetch()
+        for puller in pulled:
+            status, sample = puller.fetch()
             if sample is not None:
-                return status, link, sample
+                return status, puller, sample
             if status is DataPortStatus.CONNECTION_LOST:
-                self._drop(link.info.connector_id)
+                self._drop(puller.info.connector_id)
         return self._take_of_empty(pushed) if pushed else (status, None, None)
 
     def _take_of_empty(
@@ -185,19 +186,19 @@ class DataInPort(DataPort[T]):
 
     def _take_oldest(self, pushed: tuple[PushReceiver, ...]) -> tuple[InLink, Sample] | None:
         """With the condition held."""
-        oldest: PushReceiver | None = None
-        order = 0
-        for link in pushed:
-            first = link.buffer.ring.peek()
-            if first is not None and (oldest is None or first[1].order < order):
-                oldest, order = link, first[1].order
-        if oldest is None:
-            return None
+        if len(pushed) == 1:
+            oldest = pushed[0]
+        else:
+            waiting = [(first[1].order, link) for link in pushed if (first := link.buffer.ring.peek())]
+            if not waiting:
+                return None
+            oldest = min(waiting, key=_by_order)[1]
         ring = oldest.buffer.ring
-        had_to_wait = ring.full and ring.full_policy is FullPolicy.BLOCK
+        if not ring:
+            return None
         _, sample = ring.take()
         assert sample is not None
-        if had_to_wait:
+        if ring.full_policy is FullPolicy.BLOCK:
             self._condition.notify_all()
         return oldest, sample
 
@@ -228,6 +229,10 @@ class DataInPort(DataPort[T]):
         links = tuple(self._links_by_id.values())
         self._pushed = tuple(link for link in links if isinstance(link, PushReceiver))
         self._pulled = tuple(link for link in links if isinstance(link, PullFetcher))
+
+
+def _by_order(waiting: tuple[int, PushReceiver]) -> int:
+    return waiting[0]
 
 
 class _DirectOutlet:
