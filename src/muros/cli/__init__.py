@@ -28,6 +28,8 @@ COMMANDS = {
     "action": ("muros.cli.action", "list actions of the ROS 2 graph and send goals to them"),
     "service": ("muros.cli.service", "list and call services of the ROS 2 graph"),
     "diagnostics": ("muros.cli.diagnostics", "show what boards say about their health to tools of ROS 2"),
+    "rtc": ("muros.cli.rtc", "run RT components, make new ones, start their name service"),
+    "rtcd": ("muros.cli.rtcd", "run a manager of RT components that others load and start"),
     "lifecycle": ("muros.cli.lifecycle", "show and move managed nodes of the ROS 2 graph"),
 }
 """Sub-commands: the module, which has `run(argv) -> int` or `register(subparsers)` for argparse, and its help."""

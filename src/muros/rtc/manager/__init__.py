@@ -13,7 +13,7 @@ from muros.rtc.manager._factories import Factory, LimitError
 from muros.rtc.manager._manager import CreateError, Manager, ManagerEvent
 from muros.rtc.manager._modules import LoadedModule, ModuleError
 from muros.rtc.manager._requests import RequestError
-from muros.rtc.manager._serve import serve, serve_manager
+from muros.rtc.manager._serve import serve, serve_files, serve_manager
 from muros.rtc.manager._settings import OPTIONS_HELP, Options, Settings, parse_options, read_settings
 
 __all__ = [
@@ -31,5 +31,6 @@ __all__ = [
     "parse_options",
     "read_settings",
     "serve",
+    "serve_files",
     "serve_manager",
 ]

@@ -248,8 +248,12 @@ class Manager:
 
     def load_module(self, name: str, init: str = "") -> LoadedModule:
         """Load a module and register what is in it. ModuleError says what was wrong."""
+        return self.load_file(self.modules.find(name), init)
+
+    def load_file(self, path: Path, init: str = "") -> LoadedModule:
+        """The same for a file, wherever it lies."""
         with self._load_lock:
-            module = self.modules.load(name, init)
+            module = self.modules.load_file(path, init)
             if module.path in self._modules_of:
                 return module
             self._loading = module.path
@@ -279,6 +283,10 @@ class Manager:
     def _forget(self, module: LoadedModule) -> None:
         for factory in self._modules_of.pop(module.path, ()):
             self.factories.remove(factory)
+
+    def factories_of(self, module: LoadedModule) -> tuple[Factory, ...]:
+        """The kinds of components that a module has registered."""
+        return tuple(self._modules_of.get(module.path, ()))
 
     # Components
 

@@ -17,6 +17,7 @@ from typing import Any, Final
 
 from muros.rtc.codes import RtcError
 from muros.rtc.component import Component
+from muros.rtc.corba import add_idl_folder
 from muros.rtc.manager._spec_files import read_specs_untrusted
 from muros.rtc.properties import Properties
 
@@ -92,12 +93,16 @@ class Modules:
         raise ModuleError(f"{name}: not found in manager.modules.load_path ({places})")
 
     def load(self, name: str, init: str = "") -> LoadedModule:
-        """Import a module; one that is loaded already is given as it is.
+        """Import the module that `find` finds; see `load_file`."""
+        return self.load_file(self.find(name), init)
+
+    def load_file(self, path: Path, init: str = "") -> LoadedModule:
+        """Import a file, wherever it lies; one that is loaded already is given as it is.
 
         `init` names the function that registers its components; `<File>Init` if it is empty. ModuleError says what
         was wrong with the file.
         """
-        path = self.find(name)
+        path = path.resolve()
         if path in self._loaded:
             return self._loaded[path]
         module = _import(path)
@@ -107,8 +112,8 @@ class Modules:
 
     def unload(self, name: str) -> LoadedModule:
         """Forget a module, so that it can be loaded anew. ModuleError if it is not loaded."""
-        path = self.find(name)
-        loaded = self._loaded.pop(path, None)
+        path = next((path for path in self._loaded if name in (str(path), path.name, path.stem)), None)
+        loaded = self._loaded.pop(path or self.find(name), None)
         if loaded is None:
             raise ModuleError(f"{name} is not loaded")
         if sys.modules.get(loaded.module.__name__) is loaded.module:
@@ -149,6 +154,7 @@ def _import(path: Path) -> ModuleType:
     if folder not in sys.path:
         sys.path.append(folder)  # components import what lies beside them
     sys.modules[name] = module
+    add_idl_folder(path.parent)  # so that they find their IDL, and `import RTC` the stubs
     try:
         spec.loader.exec_module(module)
     except BaseException as error:

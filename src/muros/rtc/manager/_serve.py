@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from types import FrameType
 from typing import Final
 
@@ -13,13 +14,16 @@ from muros.findings import Finding
 from muros.rtc.codes import RtcError
 from muros.rtc.component import Component
 from muros.rtc.manager._manager import Manager
-from muros.rtc.manager._settings import parse_options, read_settings
+from muros.rtc.manager._settings import Options, parse_options, read_settings
 from muros.rtc.properties import ConfError
 
-__all__ = ["serve", "serve_manager"]
+__all__ = ["serve", "serve_files", "serve_manager"]
 
 FAILED: Final = 1
 WRONG_USE: Final = 2
+
+OWN_WAY: Final = "MyModuleInit"
+"""By this function a file of OpenRTM-aist registers and makes what it is to run as a program."""
 
 
 def serve(components: Sequence[type[Component]], argv: Sequence[str]) -> int:
@@ -36,6 +40,37 @@ def serve(components: Sequence[type[Component]], argv: Sequence[str]) -> int:
     return serve_manager(argv, init)
 
 
+def serve_files(argv: Sequence[str]) -> int:
+    """Serve one instance of each component in the files that `argv` names, among a manager's options; the exit status.
+
+    A file in the style of OpenRTM-aist does it itself where it has a function `MyModuleInit(manager)`.
+    """
+    try:
+        options = parse_options(argv)
+        files = [Path(word) for word in options.words]
+        if not files:
+            raise ConfError("name the file of a component: muros rtc run MyComp.py")
+        for file in files:
+            if not file.is_file():
+                raise ConfError(f"{file}: no such file")
+    except ConfError as error:
+        return _fail(error, WRONG_USE)
+
+    def init(manager: Manager) -> None:
+        for file in files:
+            before = set(manager.components)
+            module = manager.load_file(file)
+            own_way = getattr(module.module, OWN_WAY, None)
+            if callable(own_way):
+                own_way(manager)
+            if before != set(manager.components):
+                continue
+            for factory in manager.factories_of(module):
+                manager.create_component(factory.name)
+
+    return _serve(options, init)
+
+
 def serve_manager(argv: Sequence[str], init: Callable[[Manager], object] | None = None) -> int:
     """Start a manager, run `init`, serve until the end; the exit status. Findings go to standard error.
 
@@ -45,6 +80,13 @@ def serve_manager(argv: Sequence[str], init: Callable[[Manager], object] | None 
         options = parse_options(argv)
         if options.words:
             raise ConfError(f"{options.words[0]!r} is no option of a manager")
+    except ConfError as error:
+        return _fail(error, WRONG_USE)
+    return _serve(options, init)
+
+
+def _serve(options: Options, init: Callable[[Manager], object] | None) -> int:
+    try:
         manager = Manager(read_settings(options, environment=os.environ))
     except ConfError as error:
         return _fail(error, WRONG_USE)
