@@ -1,6 +1,6 @@
 """Parameters on every runtime, by the ids of the acceptance cases: a board that has them, another that asks."""
 
-from muros.compat import const
+from muros.compat import const, ticks_add
 from muros.rclc import (
     CapacityError,
     Executor,
@@ -297,3 +297,15 @@ def test_p15_in_the_callback() -> None:
     parameters.on_change(meddle)
     parameters.set("count", 2)
     assert len(refused) == 4
+
+
+def test_waiting_for_parameters_ends_where_ticks_wrap() -> None:
+    pair = Pair()
+    nobody = ParameterClient(pair.remote.node, "/lab/nobody", 1.0)
+    broker = pair.broker
+    broker.settle()
+    start = broker.now
+    first = ticks_add(0, -500 - start)
+    pair.remote.node.context.clock = lambda: ticks_add(first, broker.now)
+    assert not nobody.wait(2.0)
+    assert 2000 <= broker.now - start < 2100

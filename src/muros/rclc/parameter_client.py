@@ -8,7 +8,7 @@ Every method waits for the answer, at most ``timeout`` seconds, and raises a Par
 an executor, where nothing may wait, give ``then``: a function that gets the answer, or the ParameterError in its place.
 """
 
-from muros.compat import borrow, const
+from muros.compat import borrow, const, ticks_diff
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class ParameterClient:
                 self.list(timeout=min(left, _ATTEMPT))
                 return True
             except ParameterTimeoutError:
-                left = timeout - (clock() - start) / 1000
+                left = timeout - ticks_diff(clock(), start) / 1000
         return False
 
     def get(
