@@ -37,6 +37,7 @@ from muros.agent.events import (
 )
 from muros.agent.profiles import References
 from muros.findings import Findings
+from muros.links.voice import Voice
 from muros.space import Space
 from muros.xrce._types import Buffer
 from muros.xrce.constants import (
@@ -70,8 +71,6 @@ _DEAD_TICK = 1_000
 _LIVELINESS_TICK = 200
 _TWINS = 3
 """How often a living client may change its address until two devices are suspected."""
-_SUMMARY = 1_000
-"""When to look whether findings are to be summarised, in ms after one."""
 _QUIET = 200
 """Silence after the last CREATE until a client counts as ready, in ms."""
 _PROBE = bytes((GET_INFO, 1, 8, 0, 0, 0, 0xFF, 0xFE, 1, 0, 0, 0))
@@ -125,10 +124,10 @@ class Port:
         core.receive_elsewhere(self, data, address, session)
 
 
-class AgentCore:
+class AgentCore(Voice[Event]):
     """Sessions, time and findings of an agent; everything in the space is made through ``space``.
 
-    ``wall`` gives the wall clock in ns (answers to TIMESTAMP), ``on_event`` gets every event.
+    ``wall`` gives the wall clock in ns, also for answers to TIMESTAMP.
     """
 
     def __init__(
@@ -141,18 +140,15 @@ class AgentCore:
         wall: Callable[[], int],
         default_domain: int | None = None,
     ) -> None:
+        super().__init__(findings, wall)
         self.space = space
         self.references = references
-        self.findings = findings
         self.limits = limits
         self.default_domain = space.domain if default_domain is None else default_domain
         self.now = 0
-        self.on_event: Callable[[Event], object] | None = None
-        self.on_wake: Callable[[int], object] | None = None
         # dicts are sets that keep their order: the same input gives the same output
         self.unacknowledged: dict[AgentSession, None] = {}
         self.clients: dict[bytes, AgentSession] = {}
-        self._wall = wall
         self._ports: list[Port] = []
         self._fresh: dict[AgentSession, None] = {}
         self._watched: dict[AgentSession, None] = {}
@@ -242,6 +238,9 @@ class AgentCore:
             self._next = tick
             if self.on_wake is not None:
                 self.on_wake(tick)
+
+    def _wake_in(self, ms: int) -> None:
+        self._wake(self.now + ms)
 
     def has_unacknowledged(self, session: AgentSession) -> None:
         """The session has sent something that wants an acknowledgement."""
@@ -560,22 +559,6 @@ class AgentCore:
         return bytes((TIMESTAMP_REPLY, 1, 24, 0)) + stamp + stamp + originate
 
     # Words
-
-    def tell(self, event: Event) -> None:
-        """Hands an event to whoever watches."""
-        if self.on_event is not None:
-            self.on_event(event)
-
-    def report(
-        self, code: str, *, who: str, what: str, why: str, remedy: str, subject: str = "", n: int = 1
-    ) -> None:
-        """Counts a finding; times of findings are seconds of the wall clock."""
-        now = self._wall() / 1e9
-        if not self.findings.again(code, who=who, subject=subject, now=now, n=n):
-            self.findings.report(
-                code, who=who, subject=subject, what=what, why=why, remedy=remedy, now=now, n=n
-            )
-        self._wake(self.now + _SUMMARY)
 
     def _dropped(
         self,

@@ -5,6 +5,7 @@ Keys are client keys as integers, ``0xBA5EBA11`` in the texts. What went wrong i
 
 from dataclasses import dataclass
 
+from muros.links.voice import Event, counted
 from muros.xrce.constants import KIND_NAMES
 
 __all__ = [
@@ -26,15 +27,6 @@ __all__ = [
 def client_name(key: int) -> str:
     """How a client is called everywhere: ``client 0xBA5EBA11``."""
     return f"client 0x{key:08X}"
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something that happened at an agent."""
-
-    def text(self) -> str:
-        """One line for people."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,18 +79,11 @@ class ClientReady(Event):
 
     def text(self) -> str:
         """One line for people."""
-        parts = [
-            f"{count} {name}{'' if count == 1 else 's'}"
-            for count, name in (
-                (self.writers, "writer"),
-                (self.readers, "reader"),
-                (self.requesters, "service client"),
-                (self.repliers, "service"),
-            )
-            if count
-        ]
+        parts = counted(
+            writer=self.writers, reader=self.readers, service_client=self.requesters, service=self.repliers
+        )
         node = "node " + ", ".join(self.nodes) if self.nodes else "no node"
-        return f"{client_name(self.key)}: {node}: {', '.join(parts) or 'no endpoints'}"
+        return f"{client_name(self.key)}: {node}: {parts or 'no endpoints'}"
 
 
 @dataclass(frozen=True, slots=True)

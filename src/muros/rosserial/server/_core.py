@@ -9,6 +9,7 @@ from collections.abc import Callable, Hashable
 from typing import NamedTuple
 
 from muros.findings import Findings
+from muros.links.voice import Voice
 from muros.rosserial.server._board import Board
 from muros.rosserial.server._door import World
 from muros.rosserial.server._limits import Limits
@@ -17,9 +18,6 @@ from muros.rosserial.server._status import status_of
 from muros.rosserial.server.events import BoardGone, Event, LineUp
 
 __all__ = ["Identity", "Port", "ServerCore"]
-
-_SUMMARY = 1_000
-"""When to look whether findings are to be summarised, in ms after one."""
 
 
 class Identity(NamedTuple):
@@ -68,12 +66,11 @@ class Port:
             board.line_down(reason, now)
 
 
-class ServerCore:
+class ServerCore(Voice[Event]):
     """Boards, time and findings of a server.
 
-    ``wall`` gives the wall clock in ns, for findings; ``clock`` the monotonic one in ms. ``on_event`` gets every event,
-    ``on_wake(when)`` is called when `tick` is needed earlier than it said. ``on_unanswered(board)`` may change the rate
-    of the line of a board that has not been heard yet; it says whether it did.
+    ``wall`` gives the wall clock in ns, for findings; ``clock`` the monotonic one in ms. ``on_unanswered(board)`` may
+    change the rate of the line of a board that has not been heard yet; it says whether it did.
     """
 
     def __init__(
@@ -85,15 +82,12 @@ class ServerCore:
         wall: Callable[[], int],
         clock: Callable[[], int],
     ) -> None:
+        super().__init__(findings, wall)
         self.world = world
-        self.findings = findings
         self.limits = limits
         self.clock = clock
-        self.on_event: Callable[[Event], object] | None = None
-        self.on_wake: Callable[[int], object] | None = None
         self.on_unanswered: Callable[[Board], bool] | None = None
         self.boards: list[Board] = []
-        self._wall = wall
         self._diagnosed_at: int | None = None
 
     def attach(self, link: Link, identify: Callable[[Hashable], Identity]) -> Port:
@@ -156,18 +150,8 @@ class ServerCore:
         if self.on_wake is not None:
             self.on_wake(when)
 
-    def tell(self, event: Event) -> None:
-        """Hands an event to whoever watches."""
-        if self.on_event is not None:
-            self.on_event(event)
-
-    def report(
-        self, code: str, *, who: str, what: str, why: str, remedy: str, subject: str = "", n: int = 1
-    ) -> None:
-        """Counts a finding; times of findings are seconds of the wall clock."""
-        now = self._wall() / 1e9
-        self.findings.report(code, who=who, subject=subject, what=what, why=why, remedy=remedy, now=now, n=n)
-        self.wake(self.clock() + _SUMMARY)
+    def _wake_in(self, ms: int) -> None:
+        self.wake(self.clock() + ms)
 
     def _known(self, who: Identity, now: int) -> Board | None:
         """The board that comes back: one that is away, or has dialled in again before its old line ended."""

@@ -17,8 +17,9 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from muros.findings import Finding, Findings
-from muros.links import LineAddress, Link, LinkError
+from muros.findings import Findings
+from muros.links import Address, LineAddress, Link, LinkError
+from muros.links.serving import LinkDoor, LinkServer, now_ms
 from muros.rosserial.server._board import Board
 from muros.rosserial.server._core import ServerCore
 from muros.rosserial.server._door import RefusedError, World
@@ -34,14 +35,11 @@ __all__ = ["NODE_NAME", "Server"]
 NODE_NAME = "/serial_node"
 """What boards are called when nothing else is said, as the node of the ROS 1 servers was."""
 
-_NS_PER_MS = 1_000_000
-_AFTER_FAILURE = 100
-"""When timers are looked at again after one has failed, in ms."""
 _GOODBYE_S = 0.05
 """How long lines are kept open for the last frames to leave."""
 
 
-class Server:
+class Server(LinkServer[Event, "_BoardDoor"]):
     """A rosserial server. Everything it does happens on the thread of the loop that runs it.
 
     ``space``: a URL (``"dds:"``, the ROS 2 graph; ``"local:"``, only this process), a space to share with others, or
@@ -69,7 +67,7 @@ class Server:
             findings = findings or Findings()
             space = open_space(space, findings=findings)
         self.space = space
-        self.findings = findings or (Findings() if space is None else space.findings)
+        findings = findings or (Findings() if space is None else space.findings)
         self.node_name = "/" + node_name.strip("/")
         made = replace(limits or Limits(), **fields)
         self._in_space: SpaceWorld | None = None
@@ -88,20 +86,10 @@ class Server:
         if not places:
             raise ValueError("a rosserial server needs a space or a world for its boards")
         world = places[0] if len(places) == 1 else Worlds(places, self._refused_somewhere)
-        self.core = ServerCore(world, self.findings, limits=made, wall=time.time_ns, clock=_now)
-        self.core.on_event = self._tell
-        self.core.on_wake = self._arm
+        self.core = ServerCore(world, findings, limits=made, wall=time.time_ns, clock=now_ms)
+        super().__init__(self.core, "server")
         self.core.on_unanswered = self._next_baud
-        self._finding_baud: set[object] = set()
-        self.links: list[Link] = []
-        self._adapters: dict[Link, _LinkAdapter] = {}
-        self._watchers: list[Callable[[Event], object]] = []
-        self._loop: asyncio.AbstractEventLoop | None = None
-        self._timer: asyncio.TimerHandle | None = None
-        self._timer_at = 0
-        self._ticking = False
-        self._closed: asyncio.Event | None = None
-        self._ended = False
+        self._finding_baud: set[Link] = set()
         self._told = False
 
     def add_serial(
@@ -123,65 +111,20 @@ class Server:
         """
         if find_baud:
             self._finding_baud.add(link)
-        adapter = _LinkAdapter(self, link, name)
-        link.on_peer = adapter.on_peer
-        link.on_room = adapter.on_room
-        if self._loop is not None:
-            link.open(adapter)
-        self.links.append(link)
-        self._adapters[link] = adapter
+        door = _BoardDoor(self, link, name)
+        link.on_peer = door.on_peer
+        link.on_room = door.on_room
+        self._add(link, door)
         return link
 
     def remove_link(self, link: Link) -> None:
         """Closes a link; its boards count as lost."""
-        self.links.remove(link)
-        adapter = self._adapters.pop(link)
-        for board in adapter.port.boards.values():
+        door = self._remove(link)
+        for board in door.port.boards.values():
             board.stop()
         link.close()
-        for address in list(adapter.port.boards):
-            adapter.port.down(address, "its link was removed", _now())
-
-    def on_event(self, callback: Callable[[Event], object]) -> Callable[[], None]:
-        """Calls ``callback`` with every event from now on; returns a function that ends it."""
-        self._watchers.append(callback)
-        return lambda: self._watchers.remove(callback)
-
-    def on_finding(self, callback: Callable[[Finding], object]) -> Callable[[], None]:
-        """Calls ``callback`` with every new finding and with summaries; returns a function that ends it."""
-        return self.findings.on_finding(callback)
-
-    async def start(self) -> None:
-        """Opens the lines and serves in the background. Raises LinkError; no line is open then, and one may try again.
-
-        Raises RuntimeError for a server that serves already or was closed: make a new one.
-        """
-        if self._loop is not None or self._ended:
-            raise RuntimeError(
-                "this server was closed: make a new one" if self._ended else "this server runs already"
-            )
-        self._loop = asyncio.get_running_loop()
-        self._closed = asyncio.Event()
-        try:
-            if self._in_space is not None:
-                self._in_space.warm()
-            if self.space is not None:
-                self.space.attach(self._loop)
-            for link in self.links:
-                link.open(self._adapters[link])
-        except BaseException:
-            self._stop()
-            raise
-        self._arm(_now())
-
-    async def run(self) -> None:
-        """Opens the lines and serves until `close` is called or the task is cancelled. Raises LinkError."""
-        await self.start()
-        assert self._closed is not None
-        try:
-            await self._closed.wait()
-        finally:
-            await self.stop()
+        for address in list(door.port.boards):
+            door.port.down(address, "its link was removed", now_ms())
 
     async def stop(self) -> None:
         """Tells every board that nobody listens any more, waits until that has left, and closes."""
@@ -192,31 +135,25 @@ class Server:
                 await asyncio.sleep(_GOODBYE_S)
         self.close()
 
-    def close(self) -> None:
-        """Closes every line and removes every board, for good. Closing twice is harmless."""
-        if self._ended:
-            return
-        self._ended = True
+    def _attach(self, loop: asyncio.AbstractEventLoop) -> None:
+        if self._in_space is not None:
+            self._in_space.warm()
+        if self.space is not None:
+            self.space.attach(loop)
+
+    def _take_leave(self) -> None:
         if not self._told:
             self.core.stop()
-        self._stop()
+
+    def _clear(self) -> None:
         for board in list(self.core.boards):
             self.core.remove(board, "the server stops")
         if self._in_space is not None:
             self._in_space.close()
-        self.findings.flush()
+
+    def _release(self) -> None:
         if self._owns_space and self.space is not None:
             self.space.close()
-        if self._closed is not None:
-            self._closed.set()
-
-    def _stop(self) -> None:
-        self._loop = None
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-        for link in self.links:
-            link.close()
 
     def _next_baud(self, board: Board) -> bool:
         """Tries another rate with a board that does not answer, if its line has none of its own."""
@@ -230,7 +167,7 @@ class Server:
             with suppress(LinkError):  # this port may not have all of them
                 serial.set_baud(address.device, other)
                 break
-        board.set_baud(self._adapters[serial].port.identify(address).baud)
+        board.set_baud(self._doors[serial].port.identify(address).baud)
         return True
 
     def _refused_somewhere(self, owner: str, what: str, error: RefusedError) -> None:
@@ -247,86 +184,30 @@ class Server:
         if self._loop is not None:
             self._loop.call_soon(call)
 
-    def _tell(self, event: Event) -> None:
-        for callback in list(self._watchers):
-            try:
-                callback(event)
-            except Exception as error:  # whoever watches must not harm those who are watched
-                self.core.report(
-                    "watcher-failed",
-                    who=getattr(callback, "__qualname__", repr(callback)),
-                    what="{n} event{s} not taken by a watcher of the server",
-                    why=f"it raised {type(error).__name__}: {error}",
-                    remedy="Mend the callback given to on_event.",
-                )
 
-    def _arm(self, tick: int) -> None:
-        """Sees to a call of `_tick` at ``tick`` (ms) at the latest."""
-        if self._loop is None or self._ticking or (self._timer is not None and self._timer_at <= tick):
-            return
-        if self._timer is not None:
-            self._timer.cancel()
-        self._timer_at = tick
-        self._timer = self._loop.call_later(max(0, tick - _now()) / 1000, self._tick)
-
-    def _tick(self) -> None:
-        self._timer = None
-        self._ticking = True  # what wants to be called is asked for at the end
-        now = _now()
-        try:
-            due = self.core.tick(now)
-        except Exception as error:  # said loudly, yet the server goes on, and with it everybody else's boards
-            due = now + _AFTER_FAILURE
-            context = {"message": "the rosserial server has failed at a timer", "exception": error}
-            asyncio.get_running_loop().call_exception_handler(context)
-        finally:
-            self._ticking = False
-        waits = [] if due is None else [due]
-        seconds = time.time()
-        findings_due = self.findings.tick(seconds)
-        if findings_due is not None:
-            waits.append(now + max(0, int((findings_due - seconds) * 1000)) + 1)
-        if waits:
-            self._arm(min(waits))
-
-
-class _LinkAdapter:
-    """What one link tells the server: the events of a link, turned into calls of the core."""
-
+class _BoardDoor(LinkDoor):
     def __init__(self, server: Server, link: Link, name: str | None) -> None:
-        self._server = server
-        self._link = link
+        self._core = server.core
         alone = name is not None
         full = "/" + (name or server.node_name).strip("/")
         self.port = server.core.attach(link, lambda address: identify(link, address, full, alone))
+        super().__init__(self.port, server.core)
 
     def on_peer(self, address: Hashable) -> None:
         """Somebody can be spoken to."""
-        self.port.up(address, _now())
+        self.port.up(address, now_ms())
 
     def on_room(self, address: Hashable) -> None:
         """What waited for a peer has left."""
-        self.port.room(address, _now())
-
-    def on_message(self, link: Link, data: bytes, address: Hashable) -> None:
-        """Bytes came."""
-        self.port.receive(data, address, time.monotonic_ns() // _NS_PER_MS)
+        self.port.room(address, now_ms())
 
     def on_up(self, link: Link, detail: str) -> None:
         """The link or a port of it has become usable: `on_peer` says who is there."""
 
     def on_down(self, link: Link, reason: str) -> None:
         """The link or a port of it has gone."""
-        self._server._tell(LineDown(link.name, reason))
+        self._core.tell(LineDown(link.name, reason))
 
-    def on_gone(self, link: Link, address: Hashable, reason: str) -> None:
+    def on_gone(self, link: Link, address: Address, reason: str) -> None:
         """A peer cannot be reached any more."""
-        self.port.down(address, reason, _now())
-
-    def on_problem(self, link: Link, code: str, what: str, why: str, remedy: str, n: int) -> None:
-        """Something was dropped, refused or does not work."""
-        self._server.core.report(code, who=link.name, what=what, why=why, remedy=remedy, n=n)
-
-
-def _now() -> int:
-    return time.monotonic_ns() // _NS_PER_MS
+        self.port.down(address, reason, now_ms())

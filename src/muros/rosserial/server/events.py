@@ -5,6 +5,8 @@ What went wrong is not an event but a finding.
 
 from dataclasses import dataclass
 
+from muros.links import voice
+
 __all__ = [
     "BoardBack",
     "BoardGone",
@@ -27,14 +29,10 @@ _VERSIONS = {0xFE: "hydro or later", 0xFF: "groovy or earlier"}
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class Event(voice.Event):
     """Something that happened to ``board``, which is named by its line."""
 
     board: str
-
-    def text(self) -> str:
-        """One line for people."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,17 +110,13 @@ class BoardReady(Event):
 
     def text(self) -> str:
         """One line for people."""
-        parts = [
-            f"{count} {name}{'' if count == 1 else 's'}"
-            for count, name in (
-                (self.publishers, "publisher"),
-                (self.subscribers, "subscriber"),
-                (self.servers, "service"),
-                (self.clients, "service client"),
-            )
-            if count
-        ]
-        return f"board {self.board}: node {self.node}: {', '.join(parts) or 'no topics'}"
+        parts = voice.counted(
+            publisher=self.publishers,
+            subscriber=self.subscribers,
+            service=self.servers,
+            service_client=self.clients,
+        )
+        return f"board {self.board}: node {self.node}: {parts or 'no topics'}"
 
 
 @dataclass(frozen=True, slots=True)
