@@ -7,6 +7,7 @@ other rooms fill), `_options` (what the properties of a connection mean).
 """
 
 from muros.rtc.data._buffer import BufferOptions
+from muros.rtc.data._connect import connect
 from muros.rtc.data._links import Link
 from muros.rtc.data._listeners import Changes, ConnectorEvent, ConnectorInfo, DataEvent
 from muros.rtc.data._options import Side, effective_properties
@@ -70,6 +71,7 @@ __all__ = [
     "Side",
     "TransportError",
     "codec_of",
+    "connect",
     "copy_value",
     "effective_properties",
     "marshaling_types",
