@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from muros.rtc.corba._codec import IdlDataType, data_type_of
     from muros.rtc.corba._name_server import RunningNameServer, start_name_server
     from muros.rtc.corba._naming import Binding, Names, NameServer, server_address, split_path
+    from muros.rtc.corba._objects import Objects
     from muros.rtc.corba._orb import Orb, current_orb, endpoint_arguments, start_orb
+    from muros.rtc.corba._setup import set_up
     from muros.rtc.corba.idl import IdlError, load_idl
 
 __all__ = [
@@ -24,6 +26,7 @@ __all__ = [
     "IdlError",
     "NameServer",
     "Names",
+    "Objects",
     "Orb",
     "RunningNameServer",
     "add_idl_folder",
@@ -34,6 +37,7 @@ __all__ = [
     "load_idl",
     "remove_idl_folder",
     "server_address",
+    "set_up",
     "split_path",
     "start_name_server",
     "start_orb",
@@ -43,6 +47,8 @@ _PLACES: Final = {
     "_codec": ("IdlDataType", "data_type_of"),
     "_name_server": ("RunningNameServer", "start_name_server"),
     "_naming": ("Binding", "NameServer", "Names", "server_address", "split_path"),
+    "_objects": ("Objects",),
+    "_setup": ("set_up",),
     "_orb": ("Orb", "current_orb", "endpoint_arguments", "start_orb"),
     "idl": ("IdlError", "load_idl"),
 }

@@ -35,7 +35,7 @@ _lock = threading.Lock()
 _known: dict[str, IdlDataType] = {}
 
 
-def data_type_of(kind: type[Any] | str) -> IdlDataType:
+def data_type_of(kind: object) -> IdlDataType:
     """The data type of a stub class, or of a name: `IDL:RTC/TimedLong:1.0`, `RTC::TimedLong`, `TimedLong`.
 
     A name without a module is looked for in RTC. RtcError if it is not the name of a data type whose stubs are
@@ -84,7 +84,7 @@ class IdlDataType:
         return f"<data type {self.repository_id}>"
 
 
-def _find_id(kind: type[Any] | str) -> str:
+def _find_id(kind: object) -> str:
     if not isinstance(kind, str):
         return str(getattr(kind, "_NP_RepositoryId", ""))
     name = kind.strip()
