@@ -17,8 +17,9 @@ module SimpleService {
   interface MyService {
     string echo(in string msg);
     EchoList get_echo_history(); /* all of it */
-    oneway void set_value(in float value, inout long from);
-    float get_value(out string unit);
+    oneway void set_value(in float value,
+                          in long from);
+    float get_value(out string unit, inout SimpleService::EchoList all_);
   };
 };
 """
@@ -69,7 +70,7 @@ def test_everything_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) ->
         "    def echo(self, msg):",
         "    def get_echo_history(self):",
         "    def set_value(self, value, from_):",
-        "    def get_value(self):",
+        "    def get_value(self, all_):",
         '    specification = {"exec_cxt.periodic.rate": "50"}',
         "    max_instance = 4",
     ):

@@ -178,6 +178,7 @@ class Manager:
         for name in self.settings.words("manager.components.preactivation"):
             self._try("preactivation", name, lambda name=name: self.activate(name))  # type: ignore[misc]
         self._shut_down_when_empty()
+        self.log.logger.info("manager %s is up", self.name)
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until it is to end. False: `timeout` seconds passed before."""
@@ -352,6 +353,7 @@ class Manager:
         try:
             component = self._make(factory, name, request)
         except BaseException:
+            self._names.pop(name, None)
             self.factories.release(name)
             raise
         self._welcome(component)
@@ -460,9 +462,12 @@ class Manager:
         self._names[name] = names
         component.listeners.add(ComponentEvent.FINALIZED, lambda: self._component_ended(component))
         component.configure(name, properties, self.reporter)
-        code = component.initialize()
+        try:
+            code = component.initialize()
+        except RtcError as error:
+            component.exit()
+            raise CreateError(f"{name} cannot be made: {error}") from error
         if code is not ReturnCode.RTC_OK:
-            self._names.pop(name, None)
             raise CreateError(f"{name}: on_initialize answered {code.name}; its log says why")
         return component
 

@@ -1,0 +1,259 @@
+"""Managers as processes, over CORBA: names, masters and slaves, clean ends, tools."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from muros.rtc.codes import PeerLostError, ReturnCode, RtcError
+from muros.rtc.corba import Orb, RunningNameServer
+from muros.rtc.corba._manager import CorbaWorld, PeerManager
+from muros.rtc.corba._naming import NameServer
+from muros.rtc.manager._defaults import DEFAULTS
+from muros.rtc.properties import Properties
+from muros.rtc.reports import Reporter
+from tests.rtc.conftest import find_free_port
+from tests.rtc.manager._processes import Managers, wait_until
+
+VECTORS = Path(__file__).parents[2] / "vectors" / "rtc"
+
+MODULE = """
+from muros.rtc import Component
+class Wheel(Component):
+    category = "test"
+    vendor = "us"
+    max_instance = 2
+"""
+
+
+@pytest.fixture
+def managers(tmp_path: Path, name_server: RunningNameServer) -> Iterator[Managers]:
+    (tmp_path / "Wheel.py").write_text(MODULE)
+    with Managers(tmp_path, name_server.address) as made:
+        yield made
+
+
+@pytest.fixture
+def world(orb: Orb, name_server: RunningNameServer) -> Iterator[CorbaWorld]:
+    """This process's place beside those of `managers`."""
+    settings = Properties({"corba.nameservers": name_server.address}, defaults=DEFAULTS)
+    made = CorbaWorld(settings, Reporter())
+    yield made
+    made.close()
+
+
+def test_the_properties_that_tools_ask_for_are_those_of_the_captured_manager(
+    managers: Managers, world: CorbaWorld
+) -> None:
+    managers.start("-d")
+    manager = world.manager_at(managers.master_address).reference
+    captured: dict[str, Any] = json.loads((VECTORS / "manager_master.json").read_text())
+    assert manager.is_master() is captured["is_master"]
+    elsewhere = re.compile(
+        r"modules\.(C\+\+|Java|Docker)|profile_cmd|nameservers|command|^module\.|^logger\.master|"
+        r"^corba\.endpoints_|available_services|^config_file"
+    )
+    for what, values in (
+        ("profile", manager.get_profile().properties),
+        ("configuration", manager.get_configuration()),
+    ):
+        ours = {one.name: one.value.value() for one in values}
+        names = {one["name"] for one in captured[what] if not elsewhere.search(one["name"])}
+        assert names - set(ours) == set()
+        assert all(
+            isinstance(value, str) for value in ours.values()
+        )  # the real pid is a number: rtmgr -g fails
+    assert manager.get_component_profiles() == []
+    assert manager.get_service("x") is None
+
+
+def test_components_come_and_go_by_corbaloc(managers: Managers, world: CorbaWorld) -> None:
+    process = managers.start("-p", str(port := find_free_port()))
+    manager = world.manager_at(f"127.0.0.1:{port}")
+    (loadable,) = manager.listed("get_loadable_modules")
+    assert {one.name: one.value.value() for one in loadable.properties}["implementation_id"] == "Wheel"
+    assert manager.listed("get_loaded_modules") == []
+    made = manager.create_component("RTC:us:test:Wheel:Python:1.0.0?instance_name=Left&conf.default.a=b")
+    assert made is not None
+    assert made.get_component_profile().instance_name == "Left"
+    assert manager.create_component("Wheel") is not None
+    assert manager.create_component("Wheel") is None  # max_instance is 2
+    assert manager.instance_names() == {"Left", "Wheel0"}
+    assert len(manager.listed("get_loaded_modules")) == 1
+    assert len(manager.components_by_name("test/Left")) == 1
+    assert manager.delete_component("Nobody") is ReturnCode.BAD_PARAMETER
+    assert manager.delete_component("Left") is ReturnCode.RTC_OK
+    assert manager.reference.load_module("None.py", "")._v == ReturnCode.RTC_ERROR
+    assert manager.reference.unload_module("Wheel.py")._v == ReturnCode.RTC_OK
+    assert manager.reference.set_configuration("a.b", "c")._v == ReturnCode.RTC_OK
+    assert manager.reference.fork()._v == ReturnCode.UNSUPPORTED
+    assert manager.delete_component("Wheel0") is ReturnCode.RTC_OK
+    assert process.wait(20) == 0  # the last component has gone
+    with pytest.raises(PeerLostError):
+        manager.name()
+
+
+def test_a_master_makes_its_slaves_work(managers: Managers, world: CorbaWorld) -> None:
+    """It starts one that it lacks; a slave's component can be deleted through it; all end with it."""
+    process = managers.start("-d")
+    master = world.manager_at(managers.master_address)
+    made = master.create_component("Wheel?manager_name=helper")
+    assert made is not None
+    (slave,) = [PeerManager(one) for one in master.listed("get_slave_managers")]
+    assert slave.name() == "helper"
+    assert master.instance_names() == {"Wheel0"}
+    assert len(master.listed("get_components")) == 1
+    assert len(master.components_by_name("*/Wheel0")) == 1
+    assert master.create_component("Wheel") is not None
+    assert slave.instance_names() == {"Wheel0", "Wheel1"}
+    assert master.delete_component("Wheel1") is ReturnCode.RTC_OK
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(20) == 0
+    wait_until(lambda: not _answers(slave))
+
+
+def test_a_slave_finds_a_master_that_comes_later(managers: Managers, world: CorbaWorld) -> None:
+    managers.start("-o", "corba.update_master_manager.interval:0.05", "-o", "manager.instance_name:early")
+    managers.start("-d")
+    master = world.manager_at(managers.master_address)
+    wait_until(lambda: len(master.listed("get_slave_managers")) == 1)
+    assert PeerManager(master.listed("get_slave_managers")[0]).name() == "early"
+
+
+def test_two_processes_do_not_take_each_others_names(managers: Managers, world: CorbaWorld) -> None:
+    for _ in range(2):
+        managers.start("-o", "manager.components.precreate:Wheel", "-o", "naming.formats:%n.rtc")
+    wait_until(lambda: world.instance_names() == {"Wheel0", "Wheel1"})
+
+
+def test_a_name_asked_for_twice_is_bound_when_the_first_has_gone(
+    managers: Managers, orb: Orb, name_server: RunningNameServer
+) -> None:
+    words = ("-o", "manager.components.precreate:Wheel?instance_name=Only", "-o", "naming.formats:%n.rtc")
+    first = managers.start(*words)
+    server = NameServer(orb, name_server.address)
+    wait_until(lambda: server.resolve("Only.rtc") is not None)
+    reference = server.resolve("Only.rtc")
+    second = managers.start(*words, "-o", "naming.update.interval:0.05")
+    managers.wait_for(second, "Only.rtc is not bound")
+    now = server.resolve("Only.rtc")
+    assert now is not None
+    assert now._is_equivalent(reference)
+    first.send_signal(signal.SIGINT)
+    assert first.wait(20) == 0
+    wait_until(lambda: _lives(server.resolve("Only.rtc")))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_leave_no_zombies(managers: Managers, world: CorbaWorld, number: signal.Signals) -> None:
+    process = managers.start("-o", "manager.components.precreate:Wheel, Wheel")
+    wait_until(lambda: world.instance_names() == {"Wheel0", "Wheel1"})
+    process.send_signal(number)
+    assert process.wait(20) == 0
+    assert world.instance_names() == set()
+
+
+def test_names_come_back_after_the_name_server(
+    managers: Managers, orb: Orb, name_server: RunningNameServer, tmp_path: Path
+) -> None:
+    from muros.rtc.corba import start_name_server
+
+    process = managers.start(
+        *("-o", "manager.components.precreate:Wheel", "-o", "naming.formats:%n.rtc"),
+        *("-o", "naming.update.interval:0.05"),
+    )
+    server = NameServer(orb, name_server.address)
+    wait_until(lambda: server.resolve("Wheel0.rtc") is not None)
+    name_server.stop()
+    managers.wait_for(process, "name server")
+    port = int(name_server.address.rpartition(":")[2])
+    with start_name_server(port, folder=tmp_path / "other names"):
+        again = NameServer(orb, name_server.address)
+        wait_until(lambda: again.resolve("Wheel0.rtc") is not None)
+
+
+def test_a_name_server_that_comes_after_the_component(managers: Managers, orb: Orb, tmp_path: Path) -> None:
+    from muros.rtc.corba import start_name_server
+
+    port = find_free_port()
+    managers.start(
+        *("-o", "manager.components.precreate:Wheel", "-o", "naming.formats:%n.rtc"),
+        *("-o", "naming.update.interval:0.05", "-o", f"corba.nameservers:127.0.0.1:{port}"),
+    )
+    with start_name_server(port, folder=tmp_path / "late names"):
+        server = NameServer(orb, f"127.0.0.1:{port}")
+        wait_until(lambda: server.resolve("Wheel0.rtc") is not None)
+
+
+def test_addresses_of_other_processes(
+    managers: Managers, world: CorbaWorld, name_server: RunningNameServer
+) -> None:
+    managers.start("-p", str(port := find_free_port()), "-o", "manager.components.precreate:Wheel")
+    wait_until(lambda: world.instance_names() == {"Wheel0"})
+    for address in (
+        f"rtcname://{name_server.address}/Wheel0",
+        "rtcname://*/Wheel0",
+        f"rtcname://{name_server.address}/robot.host_cxt/Wheel0",
+        f"rtcloc://127.0.0.1:{port}/test/Wheel0",
+        f"rtcloc://127.0.0.1:{port}/*/Wheel0",
+    ):
+        world.activate_at(address)
+        component = world._component_at(address)
+        assert component.get_owned_contexts()[0].get_component_state(component)._v == 2
+        component.get_owned_contexts()[0].deactivate_component(component)
+    for wrong in ("rtcname://*/Nobody", f"rtcloc://127.0.0.1:{port}/test/Nobody", "ftp://x/y"):
+        with pytest.raises(RtcError, match=r"no such component|write rtcname"):
+            world.activate_at(wrong)
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (["-x"], 2, "muros: option -x not recognized"),
+        (["-f", "none.conf"], 2, r"muros: none.conf \(-f\): no such file"),
+        (["extra"], 2, "muros: 'extra' is no option of a manager"),
+        (["-o", "logger.log_level:LOUD"], 2, "muros: logger.log_level: there is no 'LOUD'"),
+        (["-o", "corba.endpoints:127.0.0.1:http"], 1, "muros: endpoint '127.0.0.1:http' of corba.endpoints"),
+        (
+            ["-o", "corba.update_master_manager.interval:soon"],
+            2,
+            "muros: corba.update_master_manager.interval: 'soon' is not a number",
+        ),
+    ],
+)
+def test_wrong_use_is_one_line(tmp_path: Path, words: list[str], status: int, message: str) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "muros", "rtcd", "-o", "logger.enable:NO", "-o", "naming.enable:NO", *words],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        timeout=30,
+        env={**os.environ, "OMNIORB_CONFIG": os.devnull},
+    )
+    assert done.returncode == status
+    assert re.match(message, done.stderr)
+    assert done.stderr.count("\n") == 1
+
+
+def _answers(manager: PeerManager) -> bool:
+    try:
+        manager.name()
+    except PeerLostError:
+        return False
+    return True
+
+
+def _lives(reference: Any) -> bool:
+    from omniORB import CORBA
+
+    try:
+        return reference is not None and not reference._non_existent()
+    except CORBA.Exception:
+        return False
