@@ -1,0 +1,101 @@
+"""What ports of all kinds have in common under their old names."""
+# ruff: noqa: N802 (the names are those that components know)
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from muros.rtc.ports import ConnectEvent, ConnectEventKind, Port
+from OpenRTM_aist._properties import Properties
+
+__all__ = ["PortBase", "PortConnectListenerType", "PortConnectRetListenerType"]
+
+
+class PortConnectListenerType:
+    """Moments of a connection at which there is no answer yet."""
+
+    ON_NOTIFY_CONNECT, ON_NOTIFY_DISCONNECT, ON_UNSUBSCRIBE_INTERFACES, PORT_CONNECT_LISTENER_NUM = range(4)
+
+    @staticmethod
+    def event(number: int) -> ConnectEventKind:
+        return tuple(ConnectEventKind)[number]
+
+
+class PortConnectRetListenerType:
+    """Moments of a connection with the answer of a step."""
+
+    (
+        ON_PUBLISH_INTERFACES,
+        ON_CONNECT_NEXTPORT,
+        ON_SUBSCRIBE_INTERFACES,
+        ON_CONNECTED,
+        ON_DISCONNECT_NEXT,
+        ON_DISCONNECTED,
+        PORT_CONNECT_RET_LISTENER_NUM,
+    ) = range(7)
+
+    @staticmethod
+    def event(number: int) -> ConnectEventKind:
+        return tuple(ConnectEventKind)[number + PortConnectListenerType.PORT_CONNECT_LISTENER_NUM]
+
+
+class PortBase:
+    """A face of a muros port."""
+
+    def __init__(self, port: Port) -> None:
+        self.port = port
+        self._listeners: dict[tuple[int, Any], Callable[..., Any]] = {}
+
+    def name(self) -> str:
+        return self.port.name
+
+    def getName(self) -> str:
+        return self.port.name
+
+    def getPortRef(self) -> Any:
+        """The reference that others call; None before the component is known to them."""
+        owner = getattr(self.port.owner, "outer", None)
+        ports = owner.get_ports() if owner is not None else ()
+        return next((one for one in ports if one.get_port_profile().name == self.port.full_name), None)
+
+    def properties(self) -> Properties:
+        return Properties.of({**self.port.properties, **self.port.configuration})
+
+    def getConnectorProfiles(self) -> list[Any]:
+        return list(self.port.connectors)
+
+    def getConnectorIds(self) -> list[str]:
+        return [connector.connector_id for connector in self.port.connectors]
+
+    def getConnectorNames(self) -> list[str]:
+        return [connector.name for connector in self.port.connectors]
+
+    def getConnectorProfileById(self, connector_id: str) -> Any:
+        return self.port.connector(connector_id)
+
+    def getConnectorProfileByName(self, name: str) -> Any:
+        return next((one for one in self.port.connectors if one.name == name), None)
+
+    def disconnect_all(self) -> Any:
+        return self.port.disconnect_all()
+
+    def addPortConnectListener(self, listener_type: int, listener: Callable[..., Any]) -> Callable[..., Any]:
+        """Tell `listener(port name, profile)` of a moment of `PortConnectListenerType`."""
+        return self._listen(PortConnectListenerType.event(listener_type), listener, with_code=False)
+
+    def addPortConnectRetListener(
+        self, listener_type: int, listener: Callable[..., Any]
+    ) -> Callable[..., Any]:
+        """Tell `listener(port name, profile, code)` of a moment of `PortConnectRetListenerType`."""
+        return self._listen(PortConnectRetListenerType.event(listener_type), listener, with_code=True)
+
+    def _listen(
+        self, kind: ConnectEventKind, listener: Callable[..., Any], *, with_code: bool
+    ) -> Callable[..., Any]:
+        def call(event: ConnectEvent) -> None:
+            arguments = (event.port.name, event.profile, *((event.code,) if with_code else ()))
+            listener(*arguments)
+
+        self.port.connect_listeners.add(kind, call)
+        return listener
