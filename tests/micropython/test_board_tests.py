@@ -27,6 +27,8 @@ TYPES = (
     "rcl_interfaces/srv/GetParameterTypes",
     "rcl_interfaces/srv/SetParametersAtomically",
     "rcl_interfaces/msg/ParameterEvent",
+    "rcl_interfaces/msg/Log",
+    "rosgraph_msgs/msg/Clock",
     *(f"lifecycle_msgs/srv/{name}" for name in ("ChangeState", "GetState")),
     *(f"lifecycle_msgs/srv/GetAvailable{name}" for name in ("States", "Transitions")),
     "lifecycle_msgs/msg/TransitionEvent",

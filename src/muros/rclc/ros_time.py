@@ -7,7 +7,7 @@
 Timers of ``Node.timer``, timeouts and everything else go by the steady clock still.
 """
 
-from muros.compat import const
+from muros.compat import const, ticks_add
 from muros.rclc.timer import Timer
 
 TYPE_CHECKING = const(0)
@@ -19,13 +19,15 @@ if TYPE_CHECKING:
 
 _NEVER = const(1000000)
 _MILLION = const(1000000)
+_DAYS = const(500000)  # seconds; further ahead boards cannot tell from back
 
 
 class RosTime:
     """The time of /clock, which a simulator or the player of a recording publishes. 0 until something has come.
 
-    ``known`` tells whether something has. When time jumps back, as where a recording begins again, timers begin a new
-    period; ``jumps`` counts that. Made in the node's context, whose executor has to run ``subscription``.
+    ``known`` tells whether something has. When time jumps back, as where a recording begins again, or days ahead,
+    timers begin a new period; ``jumps`` counts that. Made in the node's context, whose executor has to run
+    ``subscription``.
     """
 
     def __init__(self, node: "Node", kind: "Any" = None) -> None:
@@ -45,8 +47,9 @@ class RosTime:
         return self._seconds, self._nanoseconds
 
     def ticks(self) -> int:
-        """Milliseconds since time was first known."""
-        return (self._seconds - self._origin) * 1000 + self._nanoseconds // _MILLION
+        """Milliseconds since time was first known; like all ticks they begin again some time on boards."""
+        passed = (self._seconds - self._origin) * 1000 + self._nanoseconds // _MILLION
+        return passed & ticks_add(0, -1)
 
     def timer(self, period: float, callback: "Callable[[], object]", autostart: bool = True) -> "RosTimer":
         """A timer that goes by this time; arguments as for ``Node.timer``."""
@@ -57,12 +60,12 @@ class RosTime:
 
     def _on_clock(self, message: "Any") -> None:
         """Time goes on."""
-        before = self.ticks()
+        before = self.now()
         self._seconds, self._nanoseconds = message.clock.sec, message.clock.nanosec
         if not self.known:
             self.known = True
             self._origin = self._seconds
-        elif self.ticks() >= before:
+        elif self.now() >= before and self._seconds - before[0] < _DAYS:
             return
         else:
             self.jumps += 1
@@ -84,7 +87,7 @@ class RosTimer(Timer):
         """Begins a new period now, if it runs."""
         now = self._time.ticks()
         self._last = now
-        self._next = now + self.period
+        self._next = ticks_add(now, self.period)
 
     def reset(self, now: "int | None" = None) -> None:
         """Starts a new period now."""
