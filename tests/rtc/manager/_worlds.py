@@ -75,6 +75,8 @@ class MemoryWorld:
     def is_same(self, one: object, other: object) -> bool:
         return one == other
 
+    def member(self, name: str) -> None: ...
+
     def connect(
         self, ports: Sequence[str], local: Mapping[str, object], name: str, properties: Mapping[str, str]
     ) -> None:

@@ -185,7 +185,10 @@ def test_max_instance_is_kept(make: Make) -> None:
 @pytest.mark.parametrize(
     ("request_", "message"),
     [
-        ("Nothing", "no component Nothing is known; loaded: Foo, Limited, Failing, Raising. Load its module"),
+        (
+            "Nothing",
+            "no component Nothing is known; loaded: PeriodicECSharedComposite, Foo, Limited, Failing",
+        ),
         ("RTC:you:test:Foo:Python:1.0.0", "no component RTC:you:test:Foo:Python:1.0.0 is known"),
         ("Failing", "Failing0: on_initialize answered RTC_ERROR; its log says why"),
         ("Raising", "Raising0: making it raised ValueError: no wheel"),

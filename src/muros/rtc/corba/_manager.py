@@ -10,19 +10,15 @@ from typing import TYPE_CHECKING, Any, Final
 from omniORB import any
 
 from muros.rtc.codes import PeerLostError, ReturnCode, RtcError
-from muros.rtc.corba._codec import data_type_of
 from muros.rtc.corba._conversion import to_nv_list, to_return_code
 from muros.rtc.corba._lost import peer
 from muros.rtc.corba._naming import Names, NameServer, is_same, lives
-from muros.rtc.corba._objects import Objects
 from muros.rtc.corba._orb import Orb, current_orb, start_orb
-from muros.rtc.corba._service_objects import OrbServiceObjects
+from muros.rtc.corba._organization import ForeignMember
+from muros.rtc.corba._setup import set_up
 from muros.rtc.corba._stubs import RTC, RTM, RTM__POA
-from muros.rtc.data import AnyDataType
-from muros.rtc.data_types import use_data_types
 from muros.rtc.properties import Properties
 from muros.rtc.reports import Reporter
-from muros.rtc.services import use_service_objects
 
 if TYPE_CHECKING:
     from muros.rtc.component import Component
@@ -256,9 +252,7 @@ class CorbaWorld:
         self._asked: dict[str, float] = {}
         self._lock = threading.Lock()
         self._manager: ManagerServant | None = None
-        self._objects: Final = Objects(self._orb, report=reporter.take)
-        use_data_types(_data_type)
-        use_service_objects(OrbServiceObjects(self._orb))
+        self._objects: Final = set_up(self._orb, report=reporter.take)
 
     @property
     def orb(self) -> Orb:
@@ -372,6 +366,12 @@ class CorbaWorld:
     def is_same(self, one: Any, other: Any) -> bool:
         return is_same(one, other)
 
+    def member(self, name: str) -> ForeignMember | None:
+        try:
+            return ForeignMember(self._component_at(f"rtcname://*/{name}"), self._objects)
+        except RtcError:
+            return None
+
     def connect(
         self, ports: Sequence[str], local: Mapping[str, Any], name: str, properties: Mapping[str, str]
     ) -> None:
@@ -467,12 +467,6 @@ def _endpoints(settings: Properties) -> str:
     if at_master in [part.strip() for part in endpoints.split(",")]:
         return endpoints
     return at_master if first in ("", "all") else f"{at_master}, {endpoints}"
-
-
-def _data_type(given: object) -> AnyDataType:
-    if isinstance(given, (str, type)):
-        return data_type_of(given)
-    raise RtcError(f"{given!r} is no data type: give the class that IDL made, or a repository id")
 
 
 def _runs() -> bool:

@@ -20,6 +20,7 @@ from typing import Final
 from muros.rtc.actions import ComponentEvent
 from muros.rtc.codes import ReturnCode, RtcError
 from muros.rtc.component import Component
+from muros.rtc.composite import PeriodicECSharedComposite
 from muros.rtc.formats import Fields, expand
 from muros.rtc.listeners import Listeners
 from muros.rtc.manager._colleagues import Colleagues
@@ -107,6 +108,12 @@ class Manager:
         self._made = 0
         self._ending = threading.Event()
         self._closed = False
+        self.register(
+            PeriodicECSharedComposite.spec(),
+            lambda manager: PeriodicECSharedComposite(
+                lambda name: manager.component(name) or manager.world.member(name)
+            ),
+        )
 
     # What it is
 

@@ -15,6 +15,7 @@ from muros.rtc.profiles import Reference
 if TYPE_CHECKING:
     from muros.rtc.component import Component
     from muros.rtc.manager._manager import Manager
+    from muros.rtc.organization import Member
 
 __all__ = ["RemoteManager", "World"]
 
@@ -109,6 +110,10 @@ class World(Protocol):
 
     def is_same(self, one: Reference, other: Reference) -> bool:
         """Whether both lead to the same object."""
+        ...
+
+    def member(self, name: str) -> Member | None:
+        """The component of another process that a composite has as a member; None where there is none."""
         ...
 
     def connect(
