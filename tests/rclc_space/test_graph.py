@@ -51,7 +51,7 @@ class Company:
         return self
 
 
-def test_names_and_types(stage: Stage) -> None:
+def test_g1_g2_g5_names_and_types(stage: Stage) -> None:
     company = Company(stage).seen()
     graph = company.looking.graph
     assert graph.known
@@ -89,7 +89,7 @@ def test_what_is_known_of_an_endpoint(stage: Stage) -> None:
         assert (end.gid, end.qos, end.type_hash) == (b"", None, "")
 
 
-def test_who_goes_is_seen_no_more(stage: Stage) -> None:
+def test_g3_g6_who_goes_is_seen_no_more(stage: Stage) -> None:
     company = Company(stage).seen()
     graph = company.looking.graph
     company.value.destroy()
@@ -100,6 +100,14 @@ def test_who_goes_is_seen_no_more(stage: Stage) -> None:
     assert graph.servers() == []
     company.leg.context.close()
     stage.until(lambda: graph.nodes() == ["/lab/eye/looking"])
+
+
+def test_g4_two_nodes_of_one_name(stage: Stage) -> None:
+    graph = stage.node("looking").graph
+    twins = [stage.node("twin", "lab") for _ in range(2)]
+    stage.until(lambda: graph.nodes() == ["/lab/twin", "/lab/twin", "/looking"])
+    twins[0].destroy()
+    stage.until(lambda: graph.nodes() == ["/lab/twin", "/looking"])
 
 
 def test_an_executor_is_told_of_changes(stage: Stage) -> None:
