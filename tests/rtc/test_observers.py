@@ -11,7 +11,6 @@ from muros.rtc.codes import PortType, ReturnCode, RtcError
 from muros.rtc.component import Component
 from muros.rtc.configuration import ConfigurationSet
 from muros.rtc.contexts import SynchronousExecutionContext
-from muros.rtc.data import DataEvent
 from muros.rtc.observers import CAPACITY, Dialect, Observer, ObserverOptions, Outbox, StatusKind
 from muros.rtc.ports import Port
 from muros.rtc.profiles import ConnectorProfile

@@ -24,7 +24,7 @@ MOST_ANTICIPATED: Final = 200e-6
 
 _STEP: Final = 0.05
 """Share by which one wake-up corrects what is expected of the next."""
-_LEAST_STEP: Final = 1e-6
+_LEAST_STEP: Final = 2e-6
 
 
 class Schedule:
