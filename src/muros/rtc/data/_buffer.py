@@ -68,7 +68,7 @@ class Buffer(Generic[T]):
                 return BufferStatus.PRECONDITION_NOT_MET, False
             before = ring.overwritten
             status = ring.put(value)
-            if status is BufferStatus.OK:
+            if status is BufferStatus.OK and len(ring) == 1:  # nobody waits for one more
                 self.condition.notify_all()
             return status, ring.overwritten != before
 

@@ -39,6 +39,8 @@ class DataEvent(Enum):
     ON_RECEIVER_TIMEOUT = "ON_RECEIVER_TIMEOUT"
     ON_RECEIVER_ERROR = "ON_RECEIVER_ERROR"
 
+    __hash__ = object.__hash__  # looked up with every value: Enum's own is slow
+
 
 class ConnectorEvent(Enum):
     """Moments at which there is no value. Listeners are called with the `ConnectorInfo`."""
@@ -105,7 +107,9 @@ class DataListeners:
     def remove(self, event: DataEvent | ConnectorEvent, callback: Callable[..., object]) -> bool:
         """Tell `callback` no longer. False where it was not there."""
         if isinstance(event, DataEvent):
-            return self._data.remove(event, callback)
+            removed = self._data.remove(event, callback)
+            self.hears_values = any(map(self.hears, DataEvent))
+            return removed
         return self._connector.remove(event, callback)
 
     def hears(self, event: DataEvent) -> bool:
@@ -120,6 +124,8 @@ class DataListeners:
                 answer = callback(info, value)
             except Exception as error:
                 self._on_error(event, error)
+                continue
+            if answer is None:
                 continue
             if isinstance(answer, tuple) and len(answer) == 2:
                 answer, replacement = answer

@@ -65,14 +65,16 @@ class DataOutPort(DataPort[T]):
         if self._stamps:
             stamp(value, self._wall)
         outgoing = Outgoing(value)
-        status = [link.write(outgoing) for link in links]
-        self.status = status
+        status: list[DataPortStatus] = []
         good = bool(links)
-        for one, link in zip(status, links, strict=True):
+        for link in links:
+            one = link.write(outgoing)
+            status.append(one)
             if one is not DataPortStatus.PORT_OK:
                 good = False
-                if one is DataPortStatus.CONNECTION_LOST:
-                    self._drop(link.info.connector_id)
+        self.status = status
+        if not good:
+            self._drop_lost(links, status)
         return good
 
     def write_after(self) -> bool:
@@ -80,6 +82,11 @@ class DataOutPort(DataPort[T]):
         return self.value is not None and self.write(self.value)
 
     # ---- inside
+
+    def _drop_lost(self, links: tuple[OutLink, ...], status: list[DataPortStatus]) -> None:
+        for one, link in zip(status, links, strict=True):
+            if one is DataPortStatus.CONNECTION_LOST:
+                self._drop(link.info.connector_id)
 
     def _receiving_link(self, connection: Connection, options: DataOptions) -> Link:
         link = PullSource(self._setup(connection, options))
