@@ -14,7 +14,7 @@ from muros.interfaces import converter, md5, message, ros1_text, service_convert
 from muros.ros1 import Ros1Error
 from muros.ros1._services import ServiceClient, ServiceType
 from muros.rosserial import types
-from muros.rosserial.server._door import BodyError, RefusedError
+from muros.rosserial.server._door import BodyError, NamedService, RefusedError
 from muros.rosserial.server._ros1_world import Ros1BoardNode, Ros1World
 from tests.dds.peers import Peer
 from tests.ros1.peers import Master
@@ -105,7 +105,7 @@ def test_services_both_ways(master: Master, ros: Peer) -> None:
     async def main() -> None:
         findings = Findings()
         async with board(master, findings=findings) as node:
-            served = node.server("~set", *HALVES, nothing)
+            served = node.server(NamedService("~set", *HALVES), nothing)
             call = asyncio.create_task(
                 ros.ask("call", service="/serial_node/set", type="std_srvs/SetBool", request={"data": True})
             )
@@ -122,7 +122,7 @@ def test_services_both_ways(master: Master, ros: Peer) -> None:
                 await call
             served.close()
             replies: list[tuple[int, bytes]] = []
-            caller = node.caller("/host_service", *HALVES, lambda *reply: replies.append(reply))
+            caller = node.caller(NamedService("/host_service", *HALVES), lambda *reply: replies.append(reply))
             assert not caller.ready
             assert caller.call(b"\x01") == 1
             await until(lambda: any(each.code == "ros1-call-failed" for each in findings.snapshot()))
@@ -145,7 +145,7 @@ def test_services_both_ways(master: Master, ros: Peer) -> None:
 def test_calls_of_those_who_have_hung_up_are_not_made(master: Master) -> None:
     async def main() -> None:
         async with board(master) as node:
-            served: Any = node.server("~set", *HALVES, nothing)
+            served: Any = node.server(NamedService("~set", *HALVES), nothing)
             found: list[str] = []
             while not found:
                 found = [uri for uri in [await node.node.lookup("/serial_node/set")] if uri]
@@ -216,7 +216,7 @@ def test_old_definitions_meet_todays_nodes(master: Master, ros: Peer) -> None:
             unknown = node.publisher("unknown", "no_such_msgs/Thing", "1" * 32)
             unknown.publish(b"whatever")
             with pytest.raises(RefusedError, match="no_such_msgs"):
-                node.server("unknown", "no_such_msgs/Do", "1" * 32, "2" * 32, nothing)
+                node.server(NamedService("unknown", "no_such_msgs/Do", "1" * 32, "2" * 32), nothing)
             await ros.ask("destroy", thing=heard)
             await ros.ask("destroy", thing=says)
 

@@ -22,20 +22,10 @@ from muros.ros1 import Ros1Error
 from muros.rosserial.server import (
     BAUD,
     NODE_NAME,
-    BoardBack,
-    BoardGone,
-    BoardHeard,
-    BoardLog,
-    BoardLost,
-    BoardReady,
-    BoardReset,
-    BufferKnown,
-    EndpointSetUp,
     Event,
-    LineDown,
-    LineUp,
     Ros1World,
     Server,
+    events,
     serial_line,
     tcp_line,
 )
@@ -152,17 +142,17 @@ class RosserialStyle(MurosStyle):
     """`[12:00:01] Setup subscriber on led_out [std_msgs/Byte]`"""
 
     EVENTS: ClassVar[Mapping[type[Any], tuple[int, str]]] = {
-        LineUp: (INFO, PLAIN),
-        LineDown: (WARNING, YELLOW),
-        BoardHeard: (INFO, PLAIN),
-        BufferKnown: (INFO, PLAIN),
-        EndpointSetUp: (INFO, PLAIN),
-        BoardReady: (INFO, GREEN),
-        BoardReset: (WARNING, YELLOW),
-        BoardLost: (WARNING, YELLOW),
-        BoardBack: (INFO, GREEN),
-        BoardGone: (INFO, PLAIN),
-        BoardLog: (INFO, PLAIN),
+        events.LineUp: (INFO, PLAIN),
+        events.LineDown: (WARNING, YELLOW),
+        events.BoardHeard: (INFO, PLAIN),
+        events.BufferKnown: (INFO, PLAIN),
+        events.EndpointSetUp: (INFO, PLAIN),
+        events.BoardReady: (INFO, GREEN),
+        events.BoardReset: (WARNING, YELLOW),
+        events.BoardLost: (WARNING, YELLOW),
+        events.BoardBack: (INFO, GREEN),
+        events.BoardGone: (INFO, PLAIN),
+        events.BoardLog: (INFO, PLAIN),
     }
 
 

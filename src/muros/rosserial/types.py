@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import linecache
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from itertools import groupby
 from pathlib import Path
 from threading import RLock
 from typing import Any, ClassVar, NamedTuple
@@ -222,24 +223,26 @@ def _size(fields: list[_Field]) -> list[str]:
     return ["    def size(self):", f"        n = {total}", *lines, "        return n"]
 
 
+def _pieces(fields: list[_Field]) -> Iterator[list[_Field]]:
+    """The fields in order: those in a row that are numbers, times and the like together, any other alone."""
+    for in_row, found in groupby(fields, lambda field: field.length < 0 and bool(field.code)):
+        if in_row:
+            yield list(found)
+        else:
+            yield from ([field] for field in found)
+
+
 def _write(fields: list[_Field]) -> list[str]:
     lines = ["    def write(self, buf, off):"]
-    run: list[_Field] = []
-
-    def flush() -> None:
-        if run:
-            codes = "".join(field.code for field in run)
-            values = ", ".join(_value(field, f"self.{field.name}") for field in run)
-            lines.append(f'        pack_into("<{codes}", buf, off, {values})')
-            lines.append(f"        off += {sum(field.size for field in run)}")
-            run.clear()
-
-    for field in fields:
+    for piece in _pieces(fields):
+        field = piece[0]
         value = f"self.{field.name}"
         if field.length < 0 and field.code:
-            run.append(field)
+            codes = "".join(each.code for each in piece)
+            values = ", ".join(_value(each, f"self.{each.name}") for each in piece)
+            lines.append(f'        pack_into("<{codes}", buf, off, {values})')
+            lines.append(f"        off += {sum(each.size for each in piece)}")
             continue
-        flush()
         if field.length < 0:
             lines.append(
                 f"        off = {value}.write(buf, off)" if field.nested else _WRITE_TEXT.format(value)
@@ -267,7 +270,6 @@ def _write(fields: list[_Field]) -> list[str]:
                     if field.nested
                     else "            off = write_text(buf, off, e)"
                 )
-    flush()
     return [*lines, "        return off"]
 
 
@@ -282,33 +284,12 @@ def _value(field: _Field, value: str) -> str:
 
 def _read(fields: list[_Field]) -> list[str]:
     lines = ["    def read(self, buf, off, end):"]
-    run: list[_Field] = []
-
-    def flush() -> None:
-        if not run:
-            return
-        codes = "".join(field.code for field in run)
-        size = sum(field.size for field in run)
-        lines.append(f"        need(off, {size}, end)")
-        lines.append(f'        v = unpack_from("<{codes}", buf, off)')
-        at = 0
-        for field in run:
-            value = f"v[{at}]" if field.numbers else f"(v[{at}], v[{at + 1}])"
-            lines.append(
-                f"        self.{field.name} = {value} != 0"
-                if field.true
-                else f"        self.{field.name} = {value}"
-            )
-            at += len(field.code)
-        lines.append(f"        off += {size}")
-        run.clear()
-
-    for field in fields:
+    for piece in _pieces(fields):
+        field = piece[0]
         value = f"self.{field.name}"
         if field.length < 0 and field.code:
-            run.append(field)
+            lines += _read_row(piece)
             continue
-        flush()
         if field.length < 0:
             lines.append(
                 f"        off = {value}.read(buf, off, end)"
@@ -344,8 +325,19 @@ def _read(fields: list[_Field]) -> list[str]:
             else:
                 lines.append("            e, off = read_text(buf, off, end)")
                 lines.append(f"            {value}.append(e)")
-    flush()
     return [*lines, "        return off"]
+
+
+def _read_row(fields: list[_Field]) -> list[str]:
+    codes = "".join(field.code for field in fields)
+    size = sum(field.size for field in fields)
+    lines = [f"        need(off, {size}, end)", f'        v = unpack_from("<{codes}", buf, off)']
+    at = 0
+    for field in fields:
+        value = f"v[{at}]" if field.numbers else f"(v[{at}], v[{at + 1}])"
+        lines.append(f"        self.{field.name} = {value}{' != 0' if field.true else ''}")
+        at += len(field.code)
+    return [*lines, f"        off += {size}"]
 
 
 # ---- modules for boards ----

@@ -5,7 +5,16 @@
 
 from muros.rosserial.server._core import Identity, Port, ServerCore
 from muros.rosserial.server._diagnosis import judge
-from muros.rosserial.server._door import BodyError, Caller, Node, Publisher, RefusedError, Subscriber, World
+from muros.rosserial.server._door import (
+    BodyError,
+    Caller,
+    NamedService,
+    Node,
+    Publisher,
+    RefusedError,
+    Subscriber,
+    World,
+)
 from muros.rosserial.server._door import Server as Answerer
 from muros.rosserial.server._limits import Limits
 from muros.rosserial.server._lines import BAUD, BAUDS, TCP_PORT, RawFraming, serial_line, tcp_line
@@ -50,6 +59,7 @@ __all__ = [
     "Limits",
     "LineDown",
     "LineUp",
+    "NamedService",
     "Node",
     "Port",
     "Publisher",

@@ -56,6 +56,17 @@ from muros.rosserial.server._endpoints import (
 )
 from muros.rosserial.server._output import Link, Output
 from muros.rosserial.server._roster import Roster
+from muros.rosserial.server._states import (
+    ANSWER,
+    ASKING,
+    AWAY,
+    LINE_DOWN,
+    LINE_UP,
+    SILENCE,
+    SILENT,
+    SYNCED,
+    TRANSITIONS,
+)
 from muros.rosserial.server.events import (
     BoardBack,
     BoardHeard,
@@ -76,33 +87,6 @@ PROBE = bytes.fromhex("fffe0000ff0000ff00ffff00000000ff00")
 """Topic requests of both versions, parted by 00 so that a board of either understands its own."""
 CHECK = b"\xff\x00"
 """What an unconnected board answers and a connected one passes over."""
-
-# States
-AWAY = "away"
-"""There is no line to the board."""
-ASKING = "asking"
-"""The line is there; the board has not answered yet."""
-SYNCED = "synced"
-"""Topics flow."""
-SILENT = "silent"
-"""The board has not been heard for longer than it should be."""
-
-LINE_UP, LINE_DOWN, ANSWER, SILENCE = "line up", "line down", "answer", "silence"
-
-TRANSITIONS = {
-    (AWAY, LINE_UP): ASKING,
-    (ASKING, LINE_UP): ASKING,
-    (SYNCED, LINE_UP): ASKING,
-    (SILENT, LINE_UP): ASKING,
-    (ASKING, ANSWER): SYNCED,
-    (SYNCED, SILENCE): SILENT,
-    (SILENT, ANSWER): SYNCED,
-    (ASKING, LINE_DOWN): AWAY,
-    (SYNCED, LINE_DOWN): AWAY,
-    (SILENT, LINE_DOWN): AWAY,
-}
-"""What becomes of a board; what is not here changes nothing. An answer is any frame while silent, else one that
-belongs to negotiation."""
 
 _TIME_PERIOD = 2_000
 """A request for the time that comes earlier after the last one is not the regular one, in ms (that is 2.5 s)."""

@@ -8,13 +8,16 @@ board a `Node`; the ROS 2 graph converts there, a ROS 1 graph passes them on. Wh
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 __all__ = [
     "READ_DEPTH",
     "BodyError",
     "Caller",
+    "NamedService",
     "Node",
+    "OnData",
+    "OnReply",
     "Publisher",
     "RefusedError",
     "Server",
@@ -26,6 +29,21 @@ __all__ = [
 
 READ_DEPTH = 1_000
 """Messages of one topic that a world keeps for a board while its line has no room; newer ones replace older ones."""
+
+
+OnData = Callable[[], object]
+"""Called when something comes where nothing was; take until None then."""
+OnReply = Callable[[int, bytes], object]
+"""Called with the number of a call and its answer."""
+
+
+class NamedService(NamedTuple):
+    """A service as a board names it: each half has a sum of its own."""
+
+    name: str
+    type_name: str
+    request_md5: str
+    response_md5: str
 
 
 class RefusedError(Exception):
@@ -111,30 +129,18 @@ class Server(Shape, Protocol):
 
 
 class Node(Protocol):
-    """A board in a world. Names are as the board says them: relative, absolute or private.
-
-    ``on_data()`` is called when something comes where nothing was; take until None then.
-    """
+    """A board in a world. Names are as the board says them: relative, absolute or private."""
 
     def publisher(self, name: str, type_name: str, md5: str) -> Publisher:
         """A new publisher. Raises RefusedError."""
 
-    def subscriber(self, name: str, type_name: str, md5: str, on_data: Callable[[], object]) -> Subscriber:
+    def subscriber(self, name: str, type_name: str, md5: str, on_data: OnData) -> Subscriber:
         """A new subscriber. Raises RefusedError."""
 
-    def caller(
-        self,
-        name: str,
-        type_name: str,
-        request_md5: str,
-        response_md5: str,
-        on_reply: Callable[[int, bytes], object],
-    ) -> Caller:
-        """A new client of a service; ``on_reply(number, body)`` gets the answers. Raises RefusedError."""
+    def caller(self, service: NamedService, on_reply: OnReply) -> Caller:
+        """A new client of a service; ``on_reply`` gets the answers. Raises RefusedError."""
 
-    def server(
-        self, name: str, type_name: str, request_md5: str, response_md5: str, on_data: Callable[[], object]
-    ) -> Server:
+    def server(self, service: NamedService, on_data: OnData) -> Server:
         """A new service. Raises RefusedError."""
 
     def time(self) -> int:

@@ -11,7 +11,7 @@ import struct
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 from muros import interfaces
 from muros.findings import Findings
@@ -27,7 +27,7 @@ from muros.ros1 import (
     UnreachableError,
     resolve,
 )
-from muros.rosserial.server._door import READ_DEPTH, BodyError, RefusedError
+from muros.rosserial.server._door import READ_DEPTH, BodyError, NamedService, OnData, OnReply, RefusedError
 
 __all__ = ["Ros1World"]
 
@@ -188,30 +188,19 @@ class Ros1BoardNode:
         """A board's publisher."""
         return _Publisher(self, self.resolve(name, "topic"), type_name, _Passing(type_name, md5))
 
-    def subscriber(self, name: str, type_name: str, md5: str, on_data: Callable[[], object]) -> _Subscriber:
+    def subscriber(self, name: str, type_name: str, md5: str, on_data: OnData) -> _Subscriber:
         """A board's subscriber."""
         return _Subscriber(self, self.resolve(name, "topic"), type_name, _Passing(type_name, md5), on_data)
 
-    def caller(
-        self,
-        name: str,
-        type_name: str,
-        request_md5: str,
-        response_md5: str,
-        on_reply: Callable[[int, bytes], object],
-    ) -> _Caller:
+    def caller(self, service: NamedService, on_reply: OnReply) -> _Caller:
         """A board's service client."""
-        halves = _halves(type_name, request_md5, response_md5)
-        made = _Caller(self, self.resolve(name, "service"), type_name, *halves, on_reply)
+        made = _Caller(self, self._service(service), on_reply)
         self._callers.append(made)
         return made
 
-    def server(
-        self, name: str, type_name: str, request_md5: str, response_md5: str, on_data: Callable[[], object]
-    ) -> _Server:
+    def server(self, service: NamedService, on_data: OnData) -> _Server:
         """A board's service."""
-        halves = _halves(type_name, request_md5, response_md5)
-        return _Server(self, self.resolve(name, "service"), type_name, *halves, on_data)
+        return _Server(self, self._service(service), on_data)
 
     def time(self) -> int:
         """The graph's time in ns."""
@@ -266,6 +255,17 @@ class Ros1BoardNode:
             raise RefusedError(
                 str(error), f"Give the {what} another name: --remap {name}:=NEW_NAME"
             ) from None
+
+    def _service(self, named: NamedService) -> _ServiceIn:
+        name, kind = self.resolve(named.name, "service"), named.type_name
+        try:
+            md5 = interfaces.service_converter(kind).md5
+        except InterfaceError as error:
+            raise RefusedError(
+                str(error), "Name the folder that has its definition: --types FOLDER"
+            ) from None
+        request = _Passing(f"{kind}_Request", named.request_md5)
+        return _ServiceIn(name, kind, md5, request, _Passing(f"{kind}_Response", named.response_md5))
 
     async def _leave(self) -> None:
         await asyncio.gather(self._opened, return_exceptions=True)
@@ -370,7 +370,7 @@ class _Subscriber(_Shaped):
         topic: str,
         type_name: str,
         passing: _Passing,
-        on_data: Callable[[], object],
+        on_data: OnData,
     ) -> None:
         super().__init__(passing)
         self._node = owner.node
@@ -407,23 +407,24 @@ class _Subscriber(_Shaped):
             self._on_data()
 
 
+class _ServiceIn(NamedTuple):
+    """A service in the graph: its full name, its type, the sum of the whole, and how its halves pass."""
+
+    name: str
+    type_name: str
+    md5: str
+    request: _Passing
+    response: _Passing
+
+
 class _Caller(_Shaped):
-    def __init__(
-        self,
-        owner: Ros1BoardNode,
-        service: str,
-        type_name: str,
-        md5: str,
-        request: _Passing,
-        response: _Passing,
-        on_reply: Callable[[int, bytes], object],
-    ) -> None:
-        super().__init__(response, request)
+    def __init__(self, owner: Ros1BoardNode, its: _ServiceIn, on_reply: OnReply) -> None:
+        super().__init__(its.response, its.request)
         self._owner = owner
-        self._service = service
-        self._request, self._response = request, response
+        self._service = its.name
+        self._request, self._response = its.request, its.response
         self._on_reply = on_reply
-        self._client = owner.node.client(service, type_name, md5)
+        self._client = owner.node.client(its.name, its.type_name, its.md5)
         self._number = 0
         self._calls: set[asyncio.Task[Any]] = set()
         owner.world.watch_services()
@@ -465,23 +466,14 @@ class _Caller(_Shaped):
 
 
 class _Server(_Shaped):
-    def __init__(
-        self,
-        owner: Ros1BoardNode,
-        service: str,
-        type_name: str,
-        md5: str,
-        request: _Passing,
-        response: _Passing,
-        on_data: Callable[[], object],
-    ) -> None:
-        super().__init__(request, response)
+    def __init__(self, owner: Ros1BoardNode, its: _ServiceIn, on_data: OnData) -> None:
+        super().__init__(its.request, its.response)
         self._node = owner.node
-        self._request, self._response = request, response
+        self._request, self._response = its.request, its.response
         self._on_data = on_data
         self._waiting: deque[Request] = deque()
         try:
-            self._server: ServiceServer = owner.node.serve(service, type_name, md5, self._on_request)
+            self._server: ServiceServer = owner.node.serve(its.name, its.type_name, its.md5, self._on_request)
         except Ros1Error as error:
             raise RefusedError(str(error), "Let the board have one server for each service") from None
 
@@ -516,15 +508,6 @@ class _Server(_Shaped):
         self._waiting.append(request)
         if first:
             self._on_data()
-
-
-def _halves(type_name: str, request_md5: str, response_md5: str) -> tuple[str, _Passing, _Passing]:
-    """The sum of a whole service, and how its halves pass. Raises RefusedError."""
-    try:
-        md5 = interfaces.service_converter(type_name).md5
-    except InterfaceError as error:
-        raise RefusedError(str(error), "Name the folder that has its definition: --types FOLDER") from None
-    return md5, _Passing(f"{type_name}_Request", request_md5), _Passing(f"{type_name}_Response", response_md5)
 
 
 def _text(type_name: str) -> str:

@@ -17,7 +17,7 @@ from muros.rosserial.constants import (
     OVERHEAD,
 )
 from muros.rosserial.messages import TopicInfo
-from muros.rosserial.server._door import RefusedError
+from muros.rosserial.server._door import NamedService, RefusedError
 from muros.rosserial.server._endpoints import (
     Endpoint,
     Publication,
@@ -233,10 +233,12 @@ class Roster:
             return subscription
         if branch == ID_SERVICE_SERVER:
             server = ServiceServer(self.board, infos)
-            server.begin(self.board.node.server(name, kind, infos[1].md5sum, info.md5sum, server.on_data))
+            service = NamedService(name, kind, infos[1].md5sum, info.md5sum)
+            server.begin(self.board.node.server(service, server.on_data))
             return server
         client = ServiceClient(self.board, infos)
-        client.begin(self.board.node.caller(name, kind, info.md5sum, infos[1].md5sum, client.on_reply))
+        service = NamedService(name, kind, info.md5sum, infos[1].md5sum)
+        client.begin(self.board.node.caller(service, client.on_reply))
         return client
 
     def _said(self, endpoint: Endpoint) -> None:

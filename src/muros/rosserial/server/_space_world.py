@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from muros import interfaces
 from muros.interfaces import CdrError, Converter, InterfaceError
-from muros.rosserial.server._door import READ_DEPTH, BodyError, RefusedError
+from muros.rosserial.server._door import READ_DEPTH, BodyError, NamedService, OnData, OnReply, RefusedError
 from muros.rosserial.server._node_parameters import PARAMETER_KINDS, NodeParameters
 from muros.rosserial.server._parameters import plain_name
 from muros.space import (
@@ -151,29 +151,18 @@ class SpaceNode:
         full, converter = self._topic(name, type_name, md5)
         return _Publisher(self, full, converter)
 
-    def subscriber(self, name: str, type_name: str, md5: str, on_data: Callable[[], object]) -> _Subscriber:
+    def subscriber(self, name: str, type_name: str, md5: str, on_data: OnData) -> _Subscriber:
         """A board's subscriber."""
         full, converter = self._topic(name, type_name, md5)
         return _Subscriber(self, full, converter, on_data)
 
-    def caller(
-        self,
-        name: str,
-        type_name: str,
-        request_md5: str,
-        response_md5: str,
-        on_reply: Callable[[int, bytes], object],
-    ) -> _Caller:
+    def caller(self, service: NamedService, on_reply: OnReply) -> _Caller:
         """A board's service client."""
-        service, request, response = self._service(name, type_name, request_md5, response_md5)
-        return _Caller(self, service, request, response, on_reply)
+        return _Caller(self, self._service(service), on_reply)
 
-    def server(
-        self, name: str, type_name: str, request_md5: str, response_md5: str, on_data: Callable[[], object]
-    ) -> _Server:
+    def server(self, service: NamedService, on_data: OnData) -> _Server:
         """A board's service."""
-        service, request, response = self._service(name, type_name, request_md5, response_md5)
-        return _Server(self, service, request, response, on_data)
+        return _Server(self, self._service(service), on_data)
 
     def time(self) -> int:
         """The node's time in ns: the wall clock's, or that of /clock with the parameter use_sim_time."""
@@ -245,14 +234,12 @@ class SpaceNode:
         except InterfaceError as error:
             raise _unknown(error, type_name) from None
 
-    def _service(
-        self, name: str, type_name: str, request_md5: str, response_md5: str
-    ) -> tuple[Service, Converter, Converter]:
-        full = self.world.expand(name, self.participant, "service")
+    def _service(self, named: NamedService) -> _ServiceIn:
+        full = self.world.expand(named.name, self.participant, "service")
         try:
-            found = interfaces.service_converter(type_name, request_md5, response_md5)
+            found = interfaces.service_converter(named.type_name, named.request_md5, named.response_md5)
         except InterfaceError as error:
-            raise _unknown(error, type_name) from None
+            raise _unknown(error, named.type_name) from None
         service = Service(
             full,
             interfaces.dds_request_topic(full),
@@ -260,7 +247,15 @@ class SpaceNode:
             interfaces.dds_type_name(f"{found.ros2_type}_Request"),
             interfaces.dds_type_name(f"{found.ros2_type}_Response"),
         )
-        return service, found.request, found.response
+        return _ServiceIn(service, found.request, found.response)
+
+
+class _ServiceIn(NamedTuple):
+    """A service in the graph, and what converts its halves."""
+
+    service: Service
+    request: Converter
+    response: Converter
 
 
 class _Converted:
@@ -295,9 +290,7 @@ class _Publisher(_Converted):
 
 
 class _Subscriber(_Converted):
-    def __init__(
-        self, node: SpaceNode, full: str, converter: Converter, on_data: Callable[[], object]
-    ) -> None:
+    def __init__(self, node: SpaceNode, full: str, converter: Converter, on_data: OnData) -> None:
         super().__init__(converter)
         self._node = node
         self._convert = converter.to_ros1
@@ -363,19 +356,12 @@ class _Subscriber(_Converted):
 
 
 class _Caller(_Converted):
-    def __init__(
-        self,
-        node: SpaceNode,
-        service: Service,
-        request: Converter,
-        response: Converter,
-        on_reply: Callable[[int, bytes], object],
-    ) -> None:
-        super().__init__(response, request)
-        self._to_cdr = request.to_cdr
-        self._to_ros1 = response.to_ros1
+    def __init__(self, node: SpaceNode, its: _ServiceIn, on_reply: OnReply) -> None:
+        super().__init__(its.response, its.request)
+        self._to_cdr = its.request.to_cdr
+        self._to_ros1 = its.response.to_ros1
         self._on_reply = on_reply
-        self._requester = node.participant.requester(service, Qos.preset("services_default"), self._reply)
+        self._requester = node.participant.requester(its.service, Qos.preset("services_default"), self._reply)
 
     @property
     def ready(self) -> bool:
@@ -400,19 +386,12 @@ class _Caller(_Converted):
 
 
 class _Server(_Converted):
-    def __init__(
-        self,
-        node: SpaceNode,
-        service: Service,
-        request: Converter,
-        response: Converter,
-        on_data: Callable[[], object],
-    ) -> None:
-        super().__init__(request, response)
-        self._to_cdr = response.to_cdr
-        self._to_ros1 = request.to_ros1
+    def __init__(self, node: SpaceNode, its: _ServiceIn, on_data: OnData) -> None:
+        super().__init__(its.request, its.response)
+        self._to_cdr = its.response.to_cdr
+        self._to_ros1 = its.request.to_ros1
         self._replier = node.participant.replier(
-            service, Qos.preset("services_default"), on_data=lambda replier: on_data()
+            its.service, Qos.preset("services_default"), on_data=lambda replier: on_data()
         )
 
     def take(self) -> tuple[Any, bytes] | None:

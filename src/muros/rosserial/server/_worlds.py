@@ -12,7 +12,10 @@ from typing import Any, TypeVar
 from muros.rosserial.server._door import (
     BodyError,
     Caller,
+    NamedService,
     Node,
+    OnData,
+    OnReply,
     Publisher,
     RefusedError,
     Server,
@@ -68,43 +71,25 @@ class _Nodes:
         made = self._each(f"publisher {name}", lambda node, i: node.publisher(name, type_name, md5))
         return _Publishers(list(made.values()))
 
-    def subscriber(self, name: str, type_name: str, md5: str, on_data: Callable[[], object]) -> _Subscribers:
+    def subscriber(self, name: str, type_name: str, md5: str, on_data: OnData) -> _Subscribers:
         """A subscriber in each."""
         made = self._each(
             f"subscriber {name}", lambda node, i: node.subscriber(name, type_name, md5, on_data)
         )
         return _Subscribers(list(made.values()))
 
-    def caller(
-        self,
-        name: str,
-        type_name: str,
-        request_md5: str,
-        response_md5: str,
-        on_reply: Callable[[int, bytes], object],
-    ) -> _Callers:
+    def caller(self, service: NamedService, on_reply: OnReply) -> _Callers:
         """A service client in each."""
         n = len(self._nodes)
 
         def make(node: Node, i: int) -> Caller:
-            return node.caller(
-                name,
-                type_name,
-                request_md5,
-                response_md5,
-                lambda number, body: on_reply(number * n + i, body),
-            )
+            return node.caller(service, lambda number, body: on_reply(number * n + i, body))
 
-        return _Callers(self._each(f"service client {name}", make), n)
+        return _Callers(self._each(f"service client {service.name}", make), n)
 
-    def server(
-        self, name: str, type_name: str, request_md5: str, response_md5: str, on_data: Callable[[], object]
-    ) -> _Servers:
+    def server(self, service: NamedService, on_data: OnData) -> _Servers:
         """A service in each."""
-        made = self._each(
-            f"service server {name}",
-            lambda node, i: node.server(name, type_name, request_md5, response_md5, on_data),
-        )
+        made = self._each(f"service server {service.name}", lambda node, i: node.server(service, on_data))
         return _Servers(list(made.values()))
 
     def time(self) -> int:
