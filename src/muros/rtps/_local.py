@@ -2,12 +2,17 @@
 
 They are ports (`_ports.py`): the state machines of `_writer.py` and `_reader.py`, with what DDS puts around them:
 matching, deadline, liveliness, ownership, instances.
+
+What a writer and all its readers have in one process needs no datagrams. While nothing lags, waits, or is kept for
+those who come late, a sample is given to the readers by hand, and counts as sent and acknowledged; as soon as something
+stands against that for one of them (it has not heard yet where the numbers begin, refuses, is elsewhere, wants
+deadlines or instances kept) samples go the common way, in the same numbers, until all have everything again.
 """
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
-from muros.rtps._constants import StatusInfo, keyed
+from muros.rtps._constants import ENTITYID_UNKNOWN, StatusInfo, keyed
 from muros.rtps._discovery_data import EndpointData
 from muros.rtps._endpoint import Problem
 from muros.rtps._events import Data
@@ -15,8 +20,10 @@ from muros.rtps._liveliness import OwnLease
 from muros.rtps._news import DeadlineMissed, LivelinessLost, Mismatch, Trouble
 from muros.rtps._parameters import Parameters, key_hash_of, status_info_of
 from muros.rtps._parameters import inline_qos as build_inline_qos
+from muros.rtps._parameters import parse_untrusted as parse_parameters
 from muros.rtps._ports import ReaderPort, WriterPort
 from muros.rtps._qos import EndpointQos, History, Liveliness, Ownership, ResourceLimits
+from muros.rtps._reach import INSIDE
 from muros.rtps._reader import ReaderCore
 from muros.rtps._settings import ReaderSettings, WriterSettings
 from muros.rtps._values import INFINITE, Guid
@@ -27,6 +34,9 @@ if TYPE_CHECKING:
     from muros.rtps._participant import ParticipantCore
 
 __all__ = ["LocalReader", "LocalWriter", "OnSample", "Received"]
+
+TIME_END: Final = 0xFFFFFFFF * 10**9
+"""ns since 1970 from which on a time does not fit RTPS."""
 
 
 class Received(NamedTuple):
@@ -59,8 +69,8 @@ class LocalWriter(WriterPort):
     """A writer of ours. Made by `ParticipantCore.writer`."""
 
     __slots__ = (
-        "_deadlines", "_domain", "_instances", "_lease", "_on_room", "_watched", "closed", "data",
-        "guid", "owner", "refused", "rejected", "remotes",
+        "_changes", "_deadlines", "_domain", "_inline", "_inside", "_instances", "_lease", "_on_room", "_watched",
+        "closed", "data", "guid", "owner", "refused", "rejected", "remotes",
     )  # fmt: skip
 
     def __init__(
@@ -122,6 +132,14 @@ class LocalWriter(WriterPort):
         """Samples it had no room for: `write` returned 0."""
         self._instances = _instances(qos.limits if keyed(self.entity) else None)
         self._watched = self._deadlines is not None or qos.liveliness != Liveliness.AUTOMATIC
+        self._inside: tuple[
+            LocalReader, ...
+        ] = ()  # all readers, where they may be given samples by hand; as of:
+        self._changes = -1
+        self._inline: tuple[bytes, Parameters | None] = (
+            b"",
+            None,
+        )  # the inline QoS given last, and what it says
 
     @property
     def qos(self) -> EndpointQos:
@@ -174,6 +192,14 @@ class LocalWriter(WriterPort):
         if instance:
             inline_qos = inline_qos[:-SENTINEL_SIZE] + build_inline_qos(key_hash=instance)
         core = self.core
+        if core.changes != self._changes:
+            self._look_around()
+        if self._inside and core.rests and not domain.busy and not domain.inside:
+            given = self._give(payload, now, source_time, inline_qos, to)
+            if given:
+                if domain.inside or domain.news or domain.gathered:
+                    domain.settle()
+                return given
         sequence = core.write(payload, now, source_time, inline_qos, instance=instance, to=to)
         if core.due < self.wake_at:
             domain.agenda.at(self, core.due)
@@ -265,6 +291,75 @@ class LocalWriter(WriterPort):
         self._domain.finish()
         return sequence or 0
 
+    def _look_around(self) -> None:
+        """Whether all readers are of this process and take samples as they are."""
+        self._changes = self.core.changes
+        found = []
+        if not keyed(self.entity):
+            for proxy in self.core.readers:
+                reader = self._domain.registry.get(proxy.guid)
+                if (
+                    proxy.places == (INSIDE,)
+                    and not proxy.inline_qos
+                    and isinstance(reader, LocalReader)
+                    and reader.plain
+                ):
+                    found.append(reader)
+        self._inside = tuple(found) if len(found) == len(self.core.readers) else ()
+
+    def _give(
+        self,
+        payload: bytes | tuple[bytes, ...],
+        now: int,
+        source_time: int | None,
+        inline_qos: bytes,
+        to: Guid | None,
+    ) -> int:
+        """Give a sample to readers of this process by hand, without datagrams; its number, 0 = it cannot be done.
+
+        What they do with it is done in a turn of the domain, as if a datagram had come.
+        """
+        core, guid, readers = self.core, self.guid, self._inside
+        sequence = core.last + 1
+        if source_time is not None and not 0 <= source_time < TIME_END:
+            return 0
+        if to is not None and to not in self.remotes:
+            return 0
+        for reader in readers:
+            if not reader.core.awaits(guid, sequence):
+                return 0
+        inline = None
+        if inline_qos:
+            if inline_qos is not self._inline[0]:  # clients of services have one for all that they ask
+                self._inline = inline_qos, parse_parameters(inline_qos)[0]
+            inline = self._inline[1]
+        whole = b"".join(payload) if isinstance(payload, tuple) else payload
+        event = Data(
+            self.prefix, None, source_time, ENTITYID_UNKNOWN, self.entity, sequence, whole, inline, False
+        )
+        core.give()
+        domain = self._domain
+        refused = []
+        domain.busy = True
+        try:
+            for reader in readers:
+                if reader.closed:
+                    continue  # by one before it
+                if to is not None and reader.guid != to:
+                    reader.core.pass_by(guid, sequence)
+                elif not reader.core.give(event, now):
+                    refused.append(reader)
+        finally:
+            domain.busy = False
+        if refused:
+            if core.take_back(sequence):
+                return 0  # those who have it know its number
+            for reader in refused:
+                reader.core.on_data(event, now)  # which keeps it
+        if self._watched and not self.closed:
+            self._written(b"", now)
+        return sequence
+
     def _refused(self, instance: bytes) -> None:
         """The core has no room for a sample of this instance."""
         limit = self.core.settings.limit_of_one
@@ -303,8 +398,8 @@ class LocalReader(ReaderPort):
     """A reader of ours. Made by `ParticipantCore.reader`."""
 
     __slots__ = (
-        "_deadlines", "_domain", "_dropped", "_instances", "_keyed", "_lifespans", "_on_sample", "_plain", "closed",
-        "data", "guid", "outranked", "owner", "owners", "refused", "remotes",
+        "_deadlines", "_domain", "_dropped", "_instances", "_keyed", "_lifespans", "_on_sample", "closed", "data",
+        "guid", "outranked", "owner", "owners", "plain", "refused", "remotes",
     )  # fmt: skip
 
     def __init__(
@@ -348,7 +443,8 @@ class LocalReader(ReaderPort):
             self._deadlines = Deadlines(qos.deadline, domain.settings.instances, domain.agenda, self._missed)
         self._instances = _instances(qos.limits if self._keyed else None)
         self._dropped = 0
-        self._plain = not self._keyed and self.owners is None and self._deadlines is None
+        self.plain = not self._keyed and self.owners is None and self._deadlines is None
+        """Whether samples are handed on as they come."""
 
     @property
     def qos(self) -> EndpointQos:
@@ -416,7 +512,7 @@ class LocalReader(ReaderPort):
         if self.closed:
             return True
         inline = event.inline_qos
-        if self._plain and (inline is None or not status_info_of(inline)):
+        if self.plain and (inline is None or not status_info_of(inline)):
             status, instance = 0, b""
         else:
             status, instance = status_info_of(inline), b"" if not self._keyed else key_hash_of(inline)

@@ -253,6 +253,9 @@ class ParameterBuilder:
         return struct.pack(self.order + "I", len(octets)) + octets.ljust(len(octets) + 3 & ~3, b"\0")
 
 
+_END: Final = struct.pack("<HH", Pid.SENTINEL, 0)
+_RELATED_HEAD: Final = struct.pack("<HH", Pid.RELATED_SAMPLE_IDENTITY, IDENTITY_SIZE)
+_RELATED_MIDDLE: Final = struct.pack("<HH", Pid.VENDOR_RELATED_SAMPLE_IDENTITY, IDENTITY_SIZE)
 _HEADERS: Final = {order: struct.Struct(order + "HH").unpack_from for order in "<>"}
 
 
@@ -271,6 +274,8 @@ def inline_qos(*, related: bytes = b"", key_hash: bytes = b"", status: int = 0) 
         return b""
     if related and len(related) != IDENTITY_SIZE:
         raise ValueError(f"a sample identity has {IDENTITY_SIZE} bytes, this one has {len(related)}")
+    if not (key_hash or status):
+        return _RELATED_HEAD + related + _RELATED_MIDDLE + related + _END
     builder = ParameterBuilder()
     if related:
         builder.add(Pid.RELATED_SAMPLE_IDENTITY, related)
@@ -292,6 +297,8 @@ def related_identity(parameters: Parameters | None) -> bytes | None:
     for pid in (Pid.RELATED_SAMPLE_IDENTITY, Pid.VENDOR_RELATED_SAMPLE_IDENTITY):
         value = parameters.first(pid, IDENTITY_SIZE)
         if value is not None:
+            if parameters.order == "<":
+                return value[:IDENTITY_SIZE]
             high, low = struct.unpack_from(parameters.order + "iI", value, _GUID_SIZE)
             return value[:_GUID_SIZE] + struct.pack("<iI", high, low)
     return None
@@ -305,6 +312,8 @@ def status_info(parameters: Parameters | None) -> StatusInfo:
 
 def status_info_of(parameters: Parameters | None) -> int:
     """`status_info`, nothing where it is malformed."""
+    if parameters is None or Pid.STATUS_INFO not in parameters:
+        return 0
     try:
         return int(status_info(parameters))
     except InvalidParameters:

@@ -199,6 +199,30 @@ class ReaderCore:
         else:
             self._take_early(proxy, event, now)
 
+    def awaits(self, writer: Guid, sequence: int) -> bool:
+        """Whether this sample of a writer may be given by hand: it is the next one, and nothing waits."""
+        proxy = self._proxies.get(split_guid(writer))
+        if proxy is None or proxy.paused or proxy.assemblies:
+            return False
+        return proxy.expected == sequence or (not proxy.reliable and proxy.expected < sequence)
+
+    def give(self, event: Data, now: int) -> bool:
+        """Deliver a sample that it awaits; False = it was refused, and is not here."""
+        proxy = self._proxies.get((event.source, event.writer))
+        if proxy is None:
+            return True  # its writer has gone meanwhile
+        self.arrived = now
+        if not self._deliver(proxy.guid, event):
+            return False
+        proxy.expected = event.sequence + 1
+        return True
+
+    def pass_by(self, writer: Guid, sequence: int) -> None:
+        """A sample that it awaits is for somebody else."""
+        proxy = self._proxies.get(split_guid(writer))
+        if proxy is not None:
+            proxy.expected = sequence + 1
+
     def on_data_frag(self, event: DataFrag, now: int) -> None:
         """Fragments of a sample have come (8.4.14.1)."""
         proxy = self._proxies.get((event.source, event.writer))

@@ -65,7 +65,7 @@ class ReaderProxy:
 class Audience:
     """All matched readers of a writer, and where they are. With hundreds of them, one more costs what the first did."""
 
-    __slots__ = ("_at", "proxies", "reliable", "routes", "with_qos")
+    __slots__ = ("_at", "changes", "proxies", "reliable", "routes", "with_qos")
 
     def __init__(self) -> None:
         self.proxies: dict[tuple[GuidPrefix, EntityId], ReaderProxy] = {}
@@ -75,6 +75,8 @@ class Audience:
         """How many are reliable ..."""
         self.with_qos = 0
         """... and how many want the endpoint's QoS with every sample."""
+        self.changes = 0
+        """Counts comings, goings and moves."""
         self._at: Counter[tuple[Place, ...]] = Counter()
 
     def add(self, proxy: ReaderProxy) -> None:
@@ -103,6 +105,7 @@ class Audience:
 
     def _count(self, places: tuple[Place, ...], change: int) -> None:
         counts = self._at
+        self.changes += 1
         counts[places] += change
         if not counts[places]:
             del counts[places]

@@ -289,6 +289,32 @@ class WriterCore:
             self._keeper.release(self.sent, now)
         return sequence
 
+    @property
+    def rests(self) -> bool:
+        """Whether everybody has everything, and nothing is kept for those who come late."""
+        return not self._lagging and not self._unsent and not self._keeper.retains
+
+    @property
+    def changes(self) -> int:
+        """Counts the comings, goings and moves of readers."""
+        return self._audience.changes
+
+    def give(self) -> int:
+        """The number of a sample that is given to all readers by hand. Only while it `rests`."""
+        self.last = self.sent = sequence = self.last + 1
+        for proxy in self._proxies.values():
+            proxy.acked = sequence
+        return sequence
+
+    def take_back(self, sequence: int) -> bool:
+        """A sample that was given by hand was refused and is to go the common way; False when it is not the last."""
+        if self.last != sequence:
+            return False
+        self.last = self.sent = sequence - 1
+        for proxy in self._proxies.values():
+            proxy.acked = sequence - 1
+        return True
+
     def on_acknack(self, event: AckNack, now: int) -> None:
         """A reader says what it has and what it misses (8.4.7.5). Others' and old ones are ignored."""
         proxy = self._proxies.get((event.source, event.reader))

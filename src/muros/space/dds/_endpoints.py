@@ -214,7 +214,7 @@ class DdsReader(CachingReader):
         pad = payload[3] & 3
         core = self.core
         expires = received.expires
-        related = None if received.inline_qos is None else self.related(received)
+        related = None if received.inline_qos is None else self.relation(received)
         return Sample(
             payload[4 : len(payload) - pad] if pad and len(payload) >= 4 + pad else payload[4:],
             core.clock() if received.source_time is None else received.source_time,
@@ -276,7 +276,12 @@ class DdsReader(CachingReader):
         self.purge()
         return not self.full
 
+    def relation(self, received: Received) -> bytes | None:
+        """What users are told that a sample is related to."""
+        return self.related(received)
+
     def related(self, received: Received) -> bytes | None:
+        """The identity that a sample says it is related to; None without a readable one."""
         try:
             return rtps.related_identity(received.inline_qos)
         except InvalidParameters:

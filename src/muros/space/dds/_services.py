@@ -107,14 +107,14 @@ class DdsRequester(EngineRequester):
         writer = self.writer
         readers = writer.matched
         home = writer.participant.home
-        dialects = {gid: home.dialect_of(gid) for gid in readers}
         if len(self._open) >= OPEN_MOST:
             del self._open[next(iter(self._open))]
         self._open[request.sequence] = readers  # before it goes: a server in this process may answer at once
-        if len(set(dialects.values())) == 1:
-            sent = self._put(request, dialects[readers[0]], None)
+        dialects = [home.dialect_of(gid) for gid in readers]
+        if dialects and dialects.count(dialects[0]) == len(dialects):
+            sent = self._put(request, dialects[0], None)
         else:
-            put = [self._put(request, dialect, gid) for gid, dialect in dialects.items()]
+            put = [self._put(request, dialect, gid) for gid, dialect in zip(readers, dialects, strict=True)]
             sent = any(put)
         if not sent:
             self._open.pop(request.sequence, None)
@@ -436,6 +436,9 @@ class _ReplyReader(DdsReader):
         sample.related = identity_of(self._requester.gid, number)
         return sample
 
+    def relation(self, received: Received) -> None:
+        """That is told by `sample`."""
+
     def connected(self, remote: bytes) -> None:
         """A writer of replies matches."""
         self._requester.met()
@@ -468,8 +471,10 @@ class _RequestReader(DdsReader):
         if sample is not None:
             sample.sequence, body = self._replier.asked(received, payload)
             sample.data = sample.data[body - 4 :]
-            sample.related = None
         return sample
+
+    def relation(self, received: Received) -> None:
+        """Where a reply is to go is nothing for users."""
 
     def disconnected(self, remote: bytes) -> None:
         """A writer of requests matches no more."""
