@@ -46,8 +46,10 @@ class ConfigurationServant(SDOPackage__POA.Configuration):  # type: ignore[misc]
         return [to_configuration_set(one) for one in self._component.configuration.sets()]
 
     def get_configuration_set(self, config_id: str) -> Any:
-        with _sdo_errors():
+        try:
             return to_configuration_set(self._component.configuration.get(config_id))
+        except ConfigurationError as error:  # this operation has no InvalidParameter
+            raise SDOPackage.InternalError(str(error)) from error
 
     def set_configuration_set_values(self, configuration_set: Any) -> bool:
         with _sdo_errors():

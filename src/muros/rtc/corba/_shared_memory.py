@@ -200,7 +200,7 @@ class _End(OpenRTM__POA.PortSharedMemory):  # type: ignore[misc]
                     block.write(octets, self._order)
                     return True
             size = max(self._size, len(octets) + _HEAD)
-            block = _Block(str(uuid.uuid4()), size, make=True)
+            block = _Block(f"muros-{os.getpid()}-{uuid.uuid4()}", size, make=True)
             block.write(octets, self._order)
         except (OSError, ValueError) as error:
             self._tell(f"the value cannot be placed: {error}")
