@@ -44,19 +44,7 @@ def test_flush(pair: Pair, name: str) -> None:
 @pytest.mark.parametrize("name", NEW)
 def test_new(pair: Pair, name: str) -> None:
     """Each write is waited for, as the recorded ones were 20 ms apart."""
-    case = CASES[name]
-    count = 0
-
-    def sent() -> bool:
-        ends = ("OutPort.ON_RECEIVED(", "OutPort.ON_RECEIVER_FULL(")
-        return len([one for one in pair.heard if one.startswith(ends)]) >= count
-
-    def after_write(number: int) -> None:
-        nonlocal count
-        count = number // 2 if "policy=skip" in name else number
-        wait_for(sent)
-
-    replay(pair, case, after_write)
+    replay(pair, CASES[name], sent_counter(pair, name))
 
 
 @pytest.mark.parametrize("name", PERIODIC)
@@ -96,10 +84,7 @@ def test_periodic(pair: Pair, name: str) -> None:
 @pytest.mark.parametrize("name", PULL)
 def test_pull(pair: Pair, name: str) -> None:
     """`is_new` knows of values when the OutPort is in this process; the recorded one always says no."""
-    case = {**CASES[name]}
-    left = len(case["write_results"])
-    case["reads"] = [{**read, "isNew": number < left} for number, read in enumerate(case["reads"])]
-    replay(pair, case)
+    replay(pair, with_is_new(CASES[name]))
 
 
 def test_direct(pair: Pair) -> None:
@@ -138,6 +123,24 @@ def test_settings_do_not_outlive_their_connection(pair: Pair) -> None:
     pair.connect(second["properties"])
     assert [pair.out.write(long(n)) for n in range(1, 6)] == [True] * 5
     assert pair.out.status == [DataPortStatus.PORT_OK]
+
+
+def sent_counter(pair: Pair, name: str) -> Callable[[int], None]:
+    """Waits, after each write of a case, until what is to be sent then has been."""
+    ends = ("OutPort.ON_RECEIVED(", "OutPort.ON_RECEIVER_FULL(")
+
+    def after_write(number: int) -> None:
+        count = number // 2 if "policy=skip" in name else number
+        wait_for(lambda: len([one for one in pair.heard if one.startswith(ends)]) >= count)
+
+    return after_write
+
+
+def with_is_new(case: Case) -> Case:
+    """A case of a pulled connection, as `is_new` ought to answer."""
+    left = len(case["write_results"])
+    reads = [{**read, "isNew": number < left} for number, read in enumerate(case["reads"])]
+    return {**case, "reads": reads}
 
 
 def replay(pair: Pair, case: Case, after_write: Callable[[int], None] = lambda number: None) -> None:
