@@ -54,23 +54,43 @@ class LinkDown(Event):
 
 
 @dataclass(frozen=True, slots=True)
-class ClientConnected(Event):
-    """A session was made for a client that has none."""
+class _ClientEvent(Event):
+    """Something that happened to the client with this ``key``."""
 
     key: int
-    session_id: int
-    address: str
 
-    def text(self) -> str:
-        """One line for people."""
-        return f"{client_name(self.key)} connected from {self.address}"
+    @property
+    def client(self) -> str:
+        """The client in words."""
+        return client_name(self.key)
 
 
 @dataclass(frozen=True, slots=True)
-class ClientReady(Event):
+class _EntityEvent(_ClientEvent):
+    """Something that happened to an entity of a client. ``object_id`` is the whole 16-bit ObjectId."""
+
+    kind: int
+    object_id: int
+
+    @property
+    def entity(self) -> str:
+        """The entity in words."""
+        return f"{self.client}: {KIND_NAMES[self.kind]} 0x{self.object_id:04X}"
+
+
+@dataclass(frozen=True, slots=True)
+class ClientConnected(_ClientEvent):
+    """A session was made for a client that has none."""
+
+    words = "{e.client} connected from {e.address}"
+    session_id: int
+    address: str
+
+
+@dataclass(frozen=True, slots=True)
+class ClientReady(_ClientEvent):
     """A client has made its entities: a summary, once it is quiet after creating some."""
 
-    key: int
     nodes: tuple[str, ...]
     writers: int
     readers: int
@@ -83,14 +103,13 @@ class ClientReady(Event):
             writer=self.writers, reader=self.readers, service_client=self.requesters, service=self.repliers
         )
         node = "node " + ", ".join(self.nodes) if self.nodes else "no node"
-        return f"{client_name(self.key)}: {node}: {parts or 'no endpoints'}"
+        return f"{self.client}: {node}: {parts or 'no endpoints'}"
 
 
 @dataclass(frozen=True, slots=True)
-class ClientBack(Event):
+class ClientBack(_ClientEvent):
     """A known client began again or was heard again: its entities were kept. ``away`` is in seconds."""
 
-    key: int
     session_id: int
     address: str
     away: float
@@ -100,76 +119,51 @@ class ClientBack(Event):
     def text(self) -> str:
         """One line for people."""
         how = "its session began again" if self.restarted else "nothing acknowledged was lost"
-        return f"{client_name(self.key)} back after {self.away:.1f} s from {self.address}, {how}"
+        return f"{self.client} back after {self.away:.1f} s from {self.address}, {how}"
 
 
 @dataclass(frozen=True, slots=True)
-class ClientLost(Event):
+class ClientLost(_ClientEvent):
     """The way to a client is gone; the agent keeps its entities for ``kept`` seconds."""
 
-    key: int
     reason: str
     kept: float | None
 
     def text(self) -> str:
         """One line for people."""
         kept = "kept until it is back" if self.kept is None else f"kept for {self.kept:.0f} s"
-        return f"{client_name(self.key)} lost ({self.reason}), {kept}"
+        return f"{self.client} lost ({self.reason}), {kept}"
 
 
 @dataclass(frozen=True, slots=True)
-class ClientSilent(Event):
+class ClientSilent(_ClientEvent):
     """A client owes acknowledgements and has not been heard for so many seconds; samples for it pile up."""
 
-    key: int
+    words = "{e.client} silent for {e.silence:.0f} s: what it reads is not acknowledged"
     silence: float
-
-    def text(self) -> str:
-        """One line for people."""
-        return f"{client_name(self.key)} silent for {self.silence:.0f} s: what it reads is not acknowledged"
 
 
 @dataclass(frozen=True, slots=True)
-class ClientGone(Event):
+class ClientGone(_ClientEvent):
     """A session and all its entities were removed."""
 
-    key: int
+    words = "{e.client} gone: {e.reason}"
     session_id: int
     reason: str
 
-    def text(self) -> str:
-        """One line for people."""
-        return f"{client_name(self.key)} gone: {self.reason}"
-
 
 @dataclass(frozen=True, slots=True)
-class EntityCreated(Event):
-    """A client made an entity. ``object_id`` is the whole 16-bit ObjectId."""
+class EntityCreated(_EntityEvent):
+    """A client made an entity."""
 
-    key: int
-    kind: int
-    object_id: int
+    words = "{e.entity} created: {e.detail}"
     participant_id: int
     detail: str
 
-    def text(self) -> str:
-        """One line for people."""
-        return (
-            f"{client_name(self.key)}: {KIND_NAMES[self.kind]} 0x{self.object_id:04X} created: {self.detail}"
-        )
-
 
 @dataclass(frozen=True, slots=True)
-class EntityDeleted(Event):
+class EntityDeleted(_EntityEvent):
     """A client deleted an entity."""
 
-    key: int
-    kind: int
-    object_id: int
+    words = "{e.entity} deleted: {e.detail}"
     detail: str
-
-    def text(self) -> str:
-        """One line for people."""
-        return (
-            f"{client_name(self.key)}: {KIND_NAMES[self.kind]} 0x{self.object_id:04X} deleted: {self.detail}"
-        )

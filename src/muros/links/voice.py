@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 from muros.findings import Findings
 
@@ -15,13 +15,14 @@ _SUMMARY = 1_000
 
 
 class Event:
-    """Something that happened at a server. Its kinds are frozen dataclasses."""
+    """Something that happened at a server. Its kinds are frozen dataclasses; in ``words``, ``e`` is the event."""
 
     __slots__ = ()
+    words: ClassVar[str]
 
     def text(self) -> str:
         """One line for people."""
-        raise NotImplementedError
+        return self.words.format(e=self)
 
 
 E = TypeVar("E", bound=Event)

@@ -39,9 +39,7 @@ class Event(voice.Event):
 class LineUp(Event):
     """A line can be used: a port was opened, or a connection came. The server asks for topics."""
 
-    def text(self) -> str:
-        """One line for people."""
-        return f"{self.board} is up. Requesting topics..."
+    words = "{e.board} is up. Requesting topics..."
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,27 +71,21 @@ class BoardHeard(Event):
 class BufferKnown(Event):
     """A board has said how much it can send (``publish``) or take (``subscribe``) at once, in bytes."""
 
+    words = "Note: {e.way} buffer size is {e.size} bytes"
     way: str
     size: int
-
-    def text(self) -> str:
-        """One line for people."""
-        return f"Note: {self.way} buffer size is {self.size} bytes"
 
 
 @dataclass(frozen=True, slots=True)
 class EndpointSetUp(Event):
     """A board's topic or service is in the graph. The texts are those that rosserial users know."""
 
+    words = "Setup {e.kind} on {e.name} [{e.type_name}]"
     kind: str
     """``publisher``, ``subscriber``, ``service server`` or ``service client``."""
     name: str
     type_name: str
     buffer_size: int
-
-    def text(self) -> str:
-        """One line for people."""
-        return f"Setup {self.kind} on {self.name} [{self.type_name}]"
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,43 +115,32 @@ class BoardReady(Event):
 class BoardReset(Event):
     """A board has started again, or believes itself unconnected; it was asked for its topics anew."""
 
-    def text(self) -> str:
-        """One line for people."""
-        return f"board {self.board} started again. Requesting topics..."
+    words = "board {e.board} started again. Requesting topics..."
 
 
 @dataclass(frozen=True, slots=True)
 class BoardLost(Event):
     """A board is silent or its line is gone; its endpoints stay for ``kept`` seconds."""
 
+    words = "Lost sync with device: board {e.board} ({e.reason}), kept for {e.kept:.0f} s"
     reason: str
     kept: float
-
-    def text(self) -> str:
-        """One line for people."""
-        return f"Lost sync with device: board {self.board} ({self.reason}), kept for {self.kept:.0f} s"
 
 
 @dataclass(frozen=True, slots=True)
 class BoardBack(Event):
     """A lost board is heard again; ``away`` is in seconds."""
 
+    words = "board {e.board} back after {e.away:.1f} s"
     away: float
-
-    def text(self) -> str:
-        """One line for people."""
-        return f"board {self.board} back after {self.away:.1f} s"
 
 
 @dataclass(frozen=True, slots=True)
 class BoardGone(Event):
     """A board and its endpoints were removed."""
 
+    words = "board {e.board} gone: {e.reason}"
     reason: str
-
-    def text(self) -> str:
-        """One line for people."""
-        return f"board {self.board} gone: {self.reason}"
 
 
 @dataclass(frozen=True, slots=True)
