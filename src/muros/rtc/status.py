@@ -93,7 +93,7 @@ class _Watch:
             self._tell(StatusKind.RTC_STATUS, name, str(handle))
 
     def _watch_context(self, handle: int, context: object) -> None:
-        if isinstance(context, ExecutionContext):
+        if isinstance(context, ExecutionContext) and context.is_here:
             self._contexts[handle] = context.on_event(self._context_event)
 
     def _context_event(self, event: ContextEvent) -> None:

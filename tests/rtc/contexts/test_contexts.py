@@ -3,6 +3,7 @@
 No test depends on how fast the machine is: they wait for what must happen, up to `SOON`.
 """
 
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -21,6 +22,7 @@ from muros.rtc.contexts import (
     MultilayerCompositeEC,
     PeriodicExecutionContext,
     SynchronousExecutionContext,
+    inside_callback,
 )
 from tests.rtc.contexts.actors import NO, OK, Actor
 
@@ -582,6 +584,43 @@ def test_what_the_system_does_not_permit_is_a_finding(stage: Stage) -> None:
     (finding,) = stage.findings
     assert finding.code == "rtc-context-not-scheduled"
     assert "9999" in finding.why
+
+
+@pytest.mark.parametrize(
+    ("rate", "asked", "expected"),
+    [(1000.0, None, 1e-4), (100.0, None, 1e-3), (1e6, None, 1e-4), (10.0, None, 0.005), (1000.0, 0.0, 0.005)],
+)
+def test_threads_that_compute_let_a_context_on_in_time(
+    stage: Stage, rate: float, asked: float | None, expected: float
+) -> None:
+    before = sys.getswitchinterval()
+    try:
+        sys.setswitchinterval(0.005)
+        actor = Actor()
+        context = stage.make(PeriodicExecutionContext, actor, rate=rate, switch_interval=asked)
+        assert sys.getswitchinterval() == pytest.approx(0.005)
+        ran = threading.Event()
+        actor.during["onExecute"] = ran.set
+        context.activate_component(actor)
+        assert ran.wait(SOON)
+        assert sys.getswitchinterval() == pytest.approx(expected)
+        assert context.set_rate(500.0) is OK
+        expected = 0.005 if asked == 0.0 else min(expected, 2e-4)
+        assert sys.getswitchinterval() == pytest.approx(expected)
+    finally:
+        sys.setswitchinterval(before)
+
+
+def test_who_is_inside_a_callback_knows(stage: Stage) -> None:
+    actor = Actor()
+    context = stage.make(PeriodicExecutionContext, actor)
+    inside: list[bool] = []
+    actor.during["onActivated"] = lambda: inside.append(inside_callback())
+    context.activate_component(actor)
+    assert inside == [True]
+    assert not inside_callback()
+    assert context.is_here
+    assert not ExecutionContext().is_here
 
 
 def test_passes_that_take_too_long_are_counted_as_missed(stage: Stage) -> None:

@@ -84,6 +84,7 @@ def test_same_type_and_name_is_one_context() -> None:
     assert again is first
     assert other is not first
     assert make_contexts({}, shared=shared) != make_contexts({}, shared=shared)
+    assert make_contexts(properties)[0] is make_contexts(properties)[0] is not first
     first.close()
     assert make_contexts(properties, shared=shared)[0] is not first
 
@@ -107,6 +108,7 @@ def test_every_kind_can_be_made_by_its_name(name: str) -> None:
         ({"exec_cxt.periodic.rate": "0"}, "rate: '0' is no rate"),
         ({"exec_cxt.transition_timeout": "-1"}, "transition_timeout: '-1' is no time"),
         ({"exec_cxt.catch_up": "1.5"}, "catch_up: '1.5' is no number of passes"),
+        ({"exec_cxt.switch_interval": "x"}, "switch_interval: 'x' is no time"),
         ({"exec_cxt.cpu_affinity": "0-3"}, "cpu_affinity: '0-3' is no processor"),
         ({"exec_cxt.scheduling": "fifo:100"}, "scheduling: 'fifo:100' is unknown"),
         ({"exec_cxt.scheduling": "fast"}, "scheduling: 'fast' is unknown"),

@@ -17,6 +17,7 @@ from muros.rtc.contexts._registry import (
     make_context,
     make_contexts,
 )
+from muros.rtc.contexts._requests import inside_callback
 from muros.rtc.contexts._statistics import ContextStatistics, Spread
 from muros.rtc.contexts._synchronous import SynchronousExecutionContext
 from muros.rtc.contexts._threads import (
@@ -43,6 +44,7 @@ __all__ = [
     "Spread",
     "SynchronousExecutionContext",
     "context_specs",
+    "inside_callback",
     "make_context",
     "make_contexts",
 ]

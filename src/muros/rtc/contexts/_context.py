@@ -134,6 +134,11 @@ class ExecutionContext:
         return self._running
 
     @property
+    def is_here(self) -> bool:
+        """Whether this process runs its callbacks, and so its observers are told; not for a reference to another's."""
+        return type(self)._post is not ExecutionContext._post
+
+    @property
     def is_closed(self) -> bool:
         """Whether it has ended, or is about to."""
         return self._closed

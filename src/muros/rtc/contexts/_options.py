@@ -48,13 +48,17 @@ class ContextOptions:
     """Processors that the thread may run on; none named: all."""
     policy: str = ""
     """Scheduling by the system: "" as other threads, FIFO, RR."""
+    switch_interval: float | None = None
+    """Seconds after which a thread of Python that computes lets others on (`sys.setswitchinterval`, which holds for the
+    process). None: short enough for the rate; 0: as it is."""
     priority: int = 0
     """With a real-time policy: 1 to 99; 0 takes the policy's usual one."""
 
     @classmethod
     def from_properties(cls, texts: Mapping[str, str]) -> ContextOptions:
         """Options of `sync_transition`, `sync_activation`, ..., `transition_timeout`, `activation_timeout`, ...,
-        `transition_patience`, `catch_up`, `cpu_affinity: 0,1` and `scheduling: fifo:50`; others are not looked at.
+        `transition_patience`, `catch_up`, `cpu_affinity: 0,1`, `scheduling: fifo:50` and `switch_interval`; others are
+        not looked at.
 
         RtcError for a text that cannot be used.
         """
@@ -75,6 +79,9 @@ class ContextOptions:
             patience=_seconds(texts, "transition_patience", PATIENCE),
             catch_up=_whole(texts, "catch_up"),
             cpus=tuple(_cpu(word) for word in split_list(texts.get("cpu_affinity", ""))),
+            switch_interval=(
+                _seconds(texts, "switch_interval", 0.0) if texts.get("switch_interval", "").strip() else None
+            ),
             policy=policy,
             priority=priority,
         )

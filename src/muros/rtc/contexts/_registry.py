@@ -46,7 +46,7 @@ CONTEXT_TYPES: Final[dict[str, type[ExecutionContext]]] = {
 _INHERITED: Final = (
     "sync_transition", "sync_activation", "sync_deactivation", "sync_reset",
     "transition_timeout", "activation_timeout", "deactivation_timeout", "reset_timeout",
-    "transition_patience", "catch_up", "cpu_affinity", "scheduling",
+    "transition_patience", "catch_up", "cpu_affinity", "scheduling", "switch_interval",
 )  # fmt: skip
 """Options that a context takes from `exec_cxt.*` where nothing nearer to it says otherwise."""
 
@@ -85,6 +85,9 @@ class SharedContexts:
             if key not in self._contexts:
                 self._contexts[key] = make(spec)
             return self._contexts[key]
+
+
+_of_the_process: Final = SharedContexts()
 
 
 def context_specs(properties: Mapping[str, str]) -> tuple[ContextSpec, ...]:
@@ -150,8 +153,11 @@ def make_contexts(
     shared: SharedContexts | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> tuple[ExecutionContext, ...]:
-    """The contexts that a component's properties ask for, in their order; named ones may be those of others."""
-    pool = shared or SharedContexts()
+    """The contexts that a component's properties ask for, in their order; named ones may be those of others.
+
+    Components that name the same `shared` share; None: all of the process.
+    """
+    pool = _of_the_process if shared is None else shared
     return tuple(
         pool.get(spec, lambda one: make_context(one, reporter=reporter, clock=clock))
         for spec in context_specs(properties)

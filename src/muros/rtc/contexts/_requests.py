@@ -16,7 +16,7 @@ from muros.rtc.codes import ReturnCode
 from muros.rtc.contexts._cycle import Member
 from muros.rtc.contexts._states import Ask
 
-__all__ = ["Request", "conducting", "is_conducting", "wait"]
+__all__ = ["Request", "conducting", "inside_callback", "is_conducting", "wait"]
 
 
 class Request:
@@ -83,6 +83,11 @@ def conducting(context: object) -> Iterator[None]:
 def is_conducting(context: object) -> bool:
     """Whether the calling thread is inside a callback of `context`."""
     return any(other is context for other in _here.contexts)
+
+
+def inside_callback() -> bool:
+    """Whether the calling thread is inside a callback of any context of this process."""
+    return bool(_here.contexts)
 
 
 def wait(request: Request, context: object, seconds: float) -> bool | None:

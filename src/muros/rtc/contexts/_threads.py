@@ -5,10 +5,14 @@ active or in Error, a pass when one is due; otherwise it waits for a request and
 to the deadline itself, less what the system usually wakes it too late by (`Anticipation`); only a wait that is long
 enough for somebody to become impatient is one on the condition, which requests end early. So a component is activated
 at once also where passes are seconds apart.
+
+Threads of Python run one at a time, and one that computes lets others on after 5 ms by default: a context at 1 kHz
+would reach 185 Hz beside it. A periodic context therefore shortens that time for the process.
 """
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from typing import Any, ClassVar, Final
@@ -22,6 +26,13 @@ __all__ = ["EventDrivenExecutionContext", "ExtTrigExecutionContext", "PeriodicEx
 
 _SLEEP: Final = 0.02
 """Seconds before a deadline from which on the thread sleeps and requests wait."""
+
+
+_TURNS: Final = 10
+"""Times in a period that a thread of Python which computes is to let others on."""
+
+_SHORTEST_TURN: Final = 1e-4
+"""Seconds; what is shorter costs all threads more than it gives."""
 
 
 class _ThreadedContext(ExecutionContext):
@@ -108,6 +119,12 @@ class PeriodicExecutionContext(_ThreadedContext):
         super().__init__(**arguments)
         self._anticipation: Final = Anticipation()
 
+    def set_rate(self, rate: float) -> ReturnCode:
+        """Another rate; see `ExecutionContext.set_rate`."""
+        code = super().set_rate(rate)
+        self._take_turns()
+        return code
+
     def _turn(self) -> None:
         schedule = self._schedule
         with self._changed:
@@ -117,6 +134,7 @@ class PeriodicExecutionContext(_ThreadedContext):
                     self._changed.wait()
                 return
             if not schedule.is_started:
+                self._take_turns()
                 schedule.start(self._clock())
             long = schedule.deadline - self._clock() - _SLEEP
             if long > 0:
@@ -128,6 +146,14 @@ class PeriodicExecutionContext(_ThreadedContext):
             self._serve()
         if self._running and self._cycle.busy:
             self._pass()
+
+    def _take_turns(self) -> None:
+        """Have the interpreter let threads on often enough for this one to be on time."""
+        wanted = self.options.switch_interval
+        if wanted is None:
+            wanted = max(_SHORTEST_TURN, 1.0 / (_TURNS * self.rate))
+        if 0 < wanted < sys.getswitchinterval():
+            sys.setswitchinterval(wanted)
 
     def _sleep_until(self, deadline: float) -> None:
         early = self._anticipation
