@@ -10,6 +10,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Final
 
+from muros import __version__
 from muros.findings import Finding
 from muros.rtc.codes import RtcError
 from muros.rtc.component import Component
@@ -101,6 +102,8 @@ def _serve(options: Options, init: Callable[[Manager], object] | None) -> int:
     try:
         try:
             manager.start(init)
+            if not manager.is_ending:
+                _greet(manager)
             manager.wait()
         finally:
             manager.close()
@@ -112,6 +115,22 @@ def _serve(options: Options, init: Callable[[Manager], object] | None) -> int:
         for number, handler in before.items():
             signal.signal(number, handler)
     return 0
+
+
+def _greet(manager: Manager) -> None:
+    """One line: who runs, where others find it, how it ends."""
+    names = ", ".join(component.instance_name for component in manager.components)
+    kind = "master manager" if manager.is_master else "manager"
+    place = (
+        f"names at {manager.settings['corba.nameservers']}"
+        if manager.settings.flag("naming.enable")
+        else "no names"
+    )
+    print(
+        f"muros {__version__} · {names or f'{kind} {manager.name}'} · {place} · Ctrl-C ends it",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 def _show(finding: Finding) -> None:
