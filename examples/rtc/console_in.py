@@ -6,6 +6,7 @@
 Then, at another terminal: `muros rtc run console_out.py`, `rtcon ConsoleIn0.rtc:out ConsoleOut0.rtc:in`, `rtact` both.
 """
 
+import os
 import select
 import sys
 
@@ -26,20 +27,23 @@ class ConsoleIn(Component):
     out = OutPort(TimedLong)
 
     def on_activated(self, context: int) -> None:
+        self.typed = b""
         print("number: ", end="", flush=True)
 
     def on_execute(self, context: int) -> None:
         if not select.select([sys.stdin], [], [], WAIT)[0]:
             return
-        line = sys.stdin.readline()
-        if not line:  # the terminal has been closed
+        octets = os.read(sys.stdin.fileno(), 4096)
+        if not octets:  # the terminal has been closed
             self.context_of(context).deactivate_component(self.participation)
             return
-        try:
-            self.out.write(int(line))
-        except ValueError:
-            print(f"{line.strip()!r} is no whole number")
-        print("number: ", end="", flush=True)
+        *lines, self.typed = (self.typed + octets).split(b"\n")
+        for line in lines:
+            try:
+                self.out.write(int(line))
+            except ValueError:
+                print(f"{line.decode(errors='replace')!r} is no whole number")
+            print("number: ", end="", flush=True)
 
 
 if __name__ == "__main__":

@@ -7,10 +7,12 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from tests.rtc.conftest import find_free_port
+
+ENVIRONMENT = {**os.environ, "OMNIORB_CONFIG": os.devnull, "PYTHONUNBUFFERED": "1"}
 
 PATIENCE = 20.0
 """Seconds that anything may take."""
@@ -27,8 +29,29 @@ class Managers:
         self._said: dict[int, list[str]] = {}
         self._readers: list[threading.Thread] = []
 
-    def start(self, *words: str, command: tuple[str, ...] = ("rtcd",)) -> subprocess.Popen[str]:
+    def start(
+        self, *words: str, command: tuple[str, ...] = ("rtcd",), environment: Mapping[str, str] | None = None
+    ) -> subprocess.Popen[str]:
         """A manager with these options over those that keep it to this test; it runs when this returns."""
+        process = subprocess.Popen(
+            self.command(*words, command=command),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            cwd=self.folder,
+            env={**ENVIRONMENT, **(environment or {})},
+        )
+        self._processes.append(process)
+        self._said[process.pid] = []
+        reader = threading.Thread(target=self._read, args=(process,))
+        reader.start()
+        self._readers.append(reader)
+        self.wait_for(process, " is up")
+        return process
+
+    def command(self, *words: str, command: tuple[str, ...] = ("rtcd",)) -> list[str]:
+        """The command line of such a manager."""
         settings = {
             "corba.nameservers": self._names,
             "corba.endpoints": "127.0.0.1:",
@@ -43,22 +66,7 @@ class Managers:
             settings["corba.endpoints"] = f"127.0.0.1:{words[place + 1]}"
             words = (*words[:place], *words[place + 2 :])
         options = [word for key, text in settings.items() for word in ("-o", f"{key}:{text}")]
-        process = subprocess.Popen(
-            [sys.executable, "-m", "muros", *command, *options, *words],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            cwd=self.folder,
-            env={**os.environ, "OMNIORB_CONFIG": os.devnull, "PYTHONUNBUFFERED": "1"},
-        )
-        self._processes.append(process)
-        self._said[process.pid] = []
-        reader = threading.Thread(target=self._read, args=(process,))
-        reader.start()
-        self._readers.append(reader)
-        self.wait_for(process, " is up")
-        return process
+        return [sys.executable, "-m", "muros", *command, *options, *words]
 
     def said(self, process: subprocess.Popen[str]) -> str:
         """What a manager has written so far."""

@@ -86,6 +86,17 @@ def test_what_is_read_of_a_class_is_what_it_says_itself(folder: Path) -> None:
     assert said == loaded.components[0].spec()
 
 
+def test_classes_in_between_are_no_components(tmp_path: Path) -> None:
+    path = tmp_path / "NewStyleParts.py"
+    path.write_text(
+        "from muros.rtc.component import Component\n"
+        "class _Part(Component): ...\nclass Left(_Part): ...\nclass Right(Left): ...\n"
+    )
+    assert [spec["type_name"] for spec in read_specs_untrusted(path)] == ["Left", "Right"]
+    loaded = modules(tmp_path).load("NewStyleParts")
+    assert [component.__name__ for component in loaded.components] == ["Left", "Right"]
+
+
 def test_a_list_that_is_computed_is_asked_of_another_process(tmp_path: Path) -> None:
     path = tmp_path / "Computed.py"
     path.write_text(

@@ -181,7 +181,10 @@ def _entry(
     own = [
         value
         for value in vars(module).values()
-        if isinstance(value, type) and issubclass(value, Component) and value.__module__ == module.__name__
+        if isinstance(value, type)
+        and issubclass(value, Component)
+        and value.__module__ == module.__name__
+        and not value.__name__.startswith("_")
     ]
     if not own:
         raise ModuleError(

@@ -63,9 +63,12 @@ def read_specs_untrusted(path: Path) -> list[dict[str, str]]:
     if name in values:
         spec = _old_spec(values[name], values)
         specs += [spec] if spec is not None else _ask(path, name)
+    known = {"Component"}
     for node in tree.body:
-        if isinstance(node, ast.ClassDef) and any(_is_component(base) for base in node.bases):
-            specs.append(_class_spec(node))
+        if isinstance(node, ast.ClassDef) and any(_is_component(base, known) for base in node.bases):
+            known.add(node.name)
+            if not node.name.startswith("_"):
+                specs.append(_class_spec(node))
     return specs
 
 
@@ -100,8 +103,9 @@ def _pairs(texts: list[str]) -> Iterator[tuple[str, str]]:
             yield key.strip(), value.strip()
 
 
-def _is_component(base: ast.expr) -> bool:
-    return (isinstance(base, ast.Name) and base.id == "Component") or (
+def _is_component(base: ast.expr, known: set[str]) -> bool:
+    """Whether a base is `Component`, or a class of the same file derived from it."""
+    return (isinstance(base, ast.Name) and base.id in known) or (
         isinstance(base, ast.Attribute) and base.attr == "Component"
     )
 
