@@ -198,6 +198,7 @@ def test_who_goes_is_deactivated_and_shut_down() -> None:
     assert actor.trace == ["onActivated", "onDeactivated", "onShutdown"]
     assert stage.cycle.members == ()
     stage.cycle.dismiss(member, running=True)
+    assert stage.cycle.ask(member, Ask.ACTIVATE) is ReturnCode.BAD_PARAMETER
     assert actor.trace == ["onActivated", "onDeactivated", "onShutdown"]
 
 

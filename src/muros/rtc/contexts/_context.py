@@ -251,15 +251,17 @@ class ExecutionContext:
             self._joining = (*self._joining, component)
         try:
             handle = component.attach_context(self)
-            member = Member(component, handle)
-            return self._ask(Request("taking a component in", lambda: self._admit(member)))
         except Exception as error:
+            self._joined(component)
             why = str(error) if isinstance(error, PeerLostError) else f"{type(error).__name__}: {error}"
             self._note("rtc-member-lost", f"{name_of(component)} cannot be added", why)
             return ReturnCode.RTC_ERROR
-        finally:
-            with self._changed:
-                self._joining = tuple(other for other in self._joining if other is not component)
+
+        def work() -> ReturnCode:
+            self._joined(component)
+            return self._admit(Member(component, handle))
+
+        return self._ask(Request("taking a component in", work))
 
     def remove_component(self, component: Participant) -> ReturnCode:
         """Let a component go: on_deactivated if it is active, on_shutdown if the context runs."""
@@ -378,6 +380,10 @@ class ExecutionContext:
             subject,
         )
         return request.code if request.is_finished else ReturnCode.RTC_ERROR
+
+    def _joined(self, component: Participant) -> None:
+        with self._changed:
+            self._joining = tuple(other for other in self._joining if other is not component)
 
     def _admit(self, member: Member) -> ReturnCode:
         self._cycle.admit(member)

@@ -75,8 +75,10 @@ class Cycle:
         """Move a member to another state, with the calls of the way.
 
         PRECONDITION_NOT_MET where no way leads from its state, and for an activation that ended in Error;
-        RTC_ERROR for a reset that the component refused.
+        RTC_ERROR for a reset that the component refused; BAD_PARAMETER for one that has gone meanwhile.
         """
+        if member not in self.members:
+            return ReturnCode.BAD_PARAMETER
         transition = TRANSITIONS.get((member.state, ask))
         if transition is None:
             return ReturnCode.PRECONDITION_NOT_MET
