@@ -782,6 +782,57 @@ def test_a_second_board_of_one_name_gets_a_number_and_a_returning_one_its_own() 
     assert len(scene.core.boards) == 2
 
 
+@pytest.mark.parametrize("how", ["reset", "silent"])
+def test_a_board_that_dials_in_again_before_its_old_connection_has_ended_is_the_same(how: str) -> None:
+    """One that was switched off and on: its node, with its parameters, and its topics stay."""
+    scene = Scene({"gain": 2})
+    host = Scene.identify(scene, "host")
+    scene.port.identify = lambda address: host
+    first = RosLib(scene, "x")
+    led = first.subscriber("led_out", "std_msgs/Byte")
+    first.plug()
+    scene.step(3_000)
+    before = [reader.gid for reader in scene.space.graph.readers]
+    first.running = False
+    scene.step(500)
+    second = RosLib(scene, "y")
+    second.infos = first.infos
+    second.plug()
+    if how == "reset":
+        scene.step(3)
+        first.pull()  # what it was sent meanwhile has shown that it is gone
+    scene.until(lambda: len(scene.core.boards) == 1, within=3_500)
+    scene.step(500)
+    (node,) = [n for n in scene.space.graph.nodes if n.name.startswith("board")]
+    assert node.full_name == "/board_host"
+    assert [reader.gid for reader in scene.space.graph.readers] == before
+    scene.writer("/led_out", BYTE)(data=8)
+    scene.step(3)
+    assert second.taken(led) == [b"\x08"]
+    second.ask("~gain")
+    scene.step(2)
+    assert second.values is not None
+    assert second.values.ints == [2]
+    scene.step(20_000)
+    assert second.connected
+    assert len(scene.core.boards) == 1
+
+
+def test_of_two_boards_at_one_place_each_stays_itself() -> None:
+    scene = Scene()
+    host = Scene.identify(scene, "host")
+    scene.port.identify = lambda address: host
+    boards = [RosLib(scene, address) for address in "xy"]
+    for i, board in enumerate(boards):
+        board.publisher(f"topic_{i}", "std_msgs/String")
+        board.plug()
+        scene.step(700)
+    boards[0].pull()
+    scene.step(100)
+    assert {n.full_name for n in scene.space.graph.nodes} == {"/board_host", "/board_host_2", "/other"}
+    assert boards[1].connected
+
+
 def test_a_best_effort_writer_is_read_all_the_same() -> None:
     scene = Scene()
     board, led, _ = led_board(scene)

@@ -133,6 +133,8 @@ class Board:
         self.input_buffer = 0
         """The board's buffer for what it is sent; 0 until it was announced."""
         self.output_buffer = 0
+        self.came_at = 0
+        """When its line came up."""
         self.heard_at = 0
         self.connected_at = 0
         """When it last sent something that only a connected board sends; logs and questions come from others, too."""
@@ -189,7 +191,7 @@ class Board:
         self.input_buffer = self.output_buffer = 0
         self.last_time = None
         self._open_asks.clear()
-        self._first_ask = self.heard_at = self.connected_at = now
+        self.came_at = self._first_ask = self.heard_at = self.connected_at = now
         self._told_ready = False
         self.roster.restart()
         self.suspicions.begin(now)
@@ -326,6 +328,8 @@ class Board:
             return  # it never asks for the time: its silence means nothing
         silence = now - self.connected_at
         if silence >= self._patience():
+            if self.core.moves(self, now):
+                return
             self._step(SILENCE)
             self.roster.doubt()
             self._ask(now)
@@ -358,6 +362,12 @@ class Board:
         self.roster.resume()
 
     # Negotiation
+
+    def ask(self, now: int) -> None:
+        """Asks a board that should be well whether it is: it names what it has."""
+        if self.state == SYNCED:
+            self._ask(now)
+            self._plan(now)
 
     def _ask(self, now: int, again: bool = False) -> None:
         """Asks for topics, for a new reason or once more; in both versions while none was understood."""

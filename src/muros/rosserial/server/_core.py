@@ -62,7 +62,7 @@ class Port:
     def down(self, address: Hashable, reason: str, now: int) -> None:
         """Nobody can be reached at ``address`` any more."""
         board = self.boards.pop(address, None)
-        if board is not None:
+        if board is not None and not self.core.moves(board, now):
             board.line_down(reason, now)
 
 
@@ -89,10 +89,19 @@ class ServerCore(Voice[Event]):
         self.on_unanswered: Callable[[Board], bool] | None = None
         self.boards: list[Board] = []
         self._diagnosed_at: int | None = None
+        self._ports: list[Port] = []
 
     def attach(self, link: Link, identify: Callable[[Hashable], Identity]) -> Port:
         """A port for ``link``; ``identify(address)`` says who is there."""
-        return Port(self, link, identify)
+        port = Port(self, link, identify)
+        self._ports.append(port)
+        return port
+
+    def detach(self, port: Port, now: int) -> None:
+        """The link is closed; its boards count as lost."""
+        self._ports.remove(port)
+        for address in list(port.boards):
+            port.down(address, "its link was removed", now)
 
     def line_up(self, port: Port, address: Hashable, now: int) -> None:
         """A line is there: of a known board that was away, or of a new one."""
@@ -109,14 +118,30 @@ class ServerCore(Voice[Event]):
                 )
                 return
             board = self._new(port, address, who)
-        for key in [key for key, each in port.boards.items() if each is board]:
-            del port.boards[key]
-        port.boards[address] = board
+            for other in self.boards:
+                if other.key == who.key and other is not board:
+                    other.ask(now)  # if it is there no more, that shows
+        self._connect(board, port, address)
         self.tell(LineUp(board.label))
         board.line_up(port.link, address, who.baud, now)
         if self.limits.diagnostics and self._diagnosed_at is None:
             self._diagnosed_at = now + self.limits.diagnostics
             self.wake(self._diagnosed_at)
+
+    def moves(self, board: Board, now: int) -> bool:
+        """Whether a board that is gone is there already on another line, as one that was switched off and on dials in
+        before its old connection has ended: it goes on there.
+
+        What has come from the same place since the board was heard last is taken for it.
+        """
+        for port in self._ports:
+            for address, other in port.boards.items():
+                if other is not board and other.key == board.key and other.came_at > board.heard_at:
+                    self.remove(other, f"it is {board.label}, which has dialled in again")
+                    self._connect(board, port, address)
+                    board.line_up(port.link, address, other.baud, now)
+                    return True
+        return False
 
     def tick(self, now: int) -> int | None:
         """Does what has become due; returns when to call again, None: when something happens."""
@@ -152,6 +177,11 @@ class ServerCore(Voice[Event]):
 
     def _wake_in(self, ms: int) -> None:
         self.wake(self.clock() + ms)
+
+    def _connect(self, board: Board, port: Port, address: Hashable) -> None:
+        for key in [key for key, each in port.boards.items() if each is board]:
+            del port.boards[key]
+        port.boards[address] = board
 
     def _known(self, who: Identity, now: int) -> Board | None:
         """The board that comes back: one that is away, or has dialled in again before its old line ended."""

@@ -123,8 +123,7 @@ class Server(LinkServer[Event, "_BoardDoor"]):
         for board in door.port.boards.values():
             board.stop()
         link.close()
-        for address in list(door.port.boards):
-            door.port.down(address, "its link was removed", now_ms())
+        self.core.detach(door.port, now_ms())
 
     async def stop(self) -> None:
         """Tells every board that nobody listens any more, waits until that has left, and closes."""
