@@ -1,0 +1,37 @@
+"""Two components that tools are tried on: one gives numbers, the other says which it has got."""
+
+from muros.rtc import Component, InPort, OutPort, Parameter, ReturnCode
+from RTC import Time, TimedLong
+
+
+class Giver(Component):
+    """Gives numbers."""
+
+    category = "test"
+    specification = {"exec_cxt.periodic.rate": "50"}  # noqa: RUF012
+    out = OutPort(TimedLong)
+    step = Parameter(1, constraint="0<=x<=9", widget="spin")
+    fails = Parameter(0)
+
+    def on_activated(self, context: int) -> None:
+        self.number = 0
+
+    def on_execute(self, context: int) -> ReturnCode:
+        self.number += self.step
+        self.out.write(TimedLong(Time(0, 0), self.number))
+        return ReturnCode.RTC_ERROR if self.fails else ReturnCode.RTC_OK
+
+    def on_reset(self, context: int) -> None:
+        print("reset", flush=True)
+
+
+class Taker(Component):
+    """Takes numbers."""
+
+    category = "test"
+    specification = {"exec_cxt.periodic.rate": "50"}  # noqa: RUF012
+    inp = InPort(TimedLong)
+
+    def on_execute(self, context: int) -> None:
+        if self.inp.is_new():
+            print("got", self.inp.read().data, flush=True)
