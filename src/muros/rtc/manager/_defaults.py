@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import platform
 from collections.abc import Mapping
 from typing import Final
 
@@ -81,5 +80,5 @@ def host_properties() -> dict[str, str]:
         "os.release": system.release,
         "os.version": system.version,
         "os.arch": system.machine,
-        "os.hostname": platform.node(),
+        "os.hostname": system.nodename,
     }

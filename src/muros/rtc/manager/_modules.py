@@ -18,7 +18,6 @@ from typing import Any, Final
 from muros.rtc.codes import RtcError
 from muros.rtc.component import Component
 from muros.rtc.corba import add_idl_folder
-from muros.rtc.manager._spec_files import read_specs_untrusted
 from muros.rtc.properties import Properties
 
 __all__ = ["LoadedModule", "ModuleError", "Modules"]
@@ -122,6 +121,8 @@ class Modules:
 
     def loadable(self) -> list[dict[str, str]]:
         """The properties of every component that could be loaded. No file is run in this process."""
+        from muros.rtc.manager._spec_files import read_specs_untrusted
+
         found = []
         for path in self._files():
             for spec in read_specs_untrusted(path):
