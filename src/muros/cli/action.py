@@ -11,6 +11,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from muros import interfaces
+from muros.cli._listing import add_count, find_named, print_found, print_lines
 from muros.cli._names import (
     add_type_options,
     full_name,
@@ -22,7 +23,7 @@ from muros.cli._names import (
     service_of,
 )
 from muros.cli._tool import CommandError, Tool, positive
-from muros.cli.topic import command, unknown
+from muros.cli.topic import command
 
 if TYPE_CHECKING:
     from muros.space import Endpoint, Requester, Sample
@@ -61,16 +62,16 @@ def register(subparsers: Any) -> None:
     words = parser.add_subparsers(required=True, metavar="list | info | type | find | send_goal")
     listing = command(words, "list", list_actions, "list the actions that somebody serves or uses")
     listing.add_argument("-t", "--show-types", action="store_true", help="with the type of each")
-    listing.add_argument("-c", "--count-actions", action="store_true", help="only how many there are")
+    add_count(listing, "--count-actions")
     about = command(words, "info", info, "show who serves and uses an action")
     about.add_argument("action_name", metavar="ACTION")
     about.add_argument("-t", "--show-types", action="store_true", help="with the type that each node has")
-    about.add_argument("-c", "--count", action="store_true", help="only how many there are")
+    add_count(about, "--count")
     kind = command(words, "type", print_type, "print the type of an action")
     kind.add_argument("action_name", metavar="ACTION")
     find = command(words, "find", find_actions, "list the actions of a type")
     find.add_argument("action_type", metavar="TYPE")
-    find.add_argument("-c", "--count-actions", action="store_true", help="only how many there are")
+    add_count(find, "--count-actions")
     send = command(words, "send_goal", send_goal, "send a goal and see it through; Ctrl-C cancels it")
     send.add_argument("action_name", metavar="ACTION")
     send.add_argument("action_type", metavar="TYPE")
@@ -90,11 +91,7 @@ async def list_actions(tool: Tool, arguments: argparse.Namespace) -> None:
     """`muros action list`."""
     await tool.discover()
     found = [action for action in _actions(tool) if not is_hidden(action.name)]
-    if arguments.count_actions:
-        tool.print(len(found))
-        return
-    for action in found:
-        tool.print(action.name + (f" [{', '.join(action.types)}]" if arguments.show_types else ""))
+    print_found(tool, found, count=arguments.count, types=arguments.show_types)
 
 
 async def info(tool: Tool, arguments: argparse.Namespace) -> None:
@@ -118,8 +115,7 @@ async def find_actions(tool: Tool, arguments: argparse.Namespace) -> None:
     wanted = "/".join(interfaces.split_type(arguments.action_type, "action"))
     await tool.discover()
     names = [action.name for action in _actions(tool) if wanted in action.types]
-    for line in [len(names)] if arguments.count_actions else names:
-        tool.print(line)
+    print_lines(tool, names, count=arguments.count)
 
 
 async def send_goal(tool: Tool, arguments: argparse.Namespace) -> None:
@@ -332,8 +328,4 @@ def _type(endpoint: Endpoint) -> str:
 async def _known(tool: Tool, asked: str) -> RosAction:
     name = full_name(asked, "action")
     await tool.discover()
-    actions = _actions(tool)
-    for action in actions:
-        if action.name == name:
-            return action
-    raise CommandError(unknown("action", name, [action.name for action in actions], tool.domain))
+    return find_named(tool, "action", name, _actions(tool))

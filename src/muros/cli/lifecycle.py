@@ -10,6 +10,7 @@ import argparse
 import asyncio
 from typing import Any, Final
 
+from muros.cli._listing import add_count, print_lines
 from muros.cli._names import full_name, is_hidden, ros_service, ros_services, service_of, type_of_service
 from muros.cli._tool import CommandError, Tool, positive
 from muros.cli.topic import command, unknown
@@ -33,7 +34,7 @@ def register(subparsers: Any) -> None:
     words = parser.add_subparsers(required=True, metavar="nodes | list | get | set")
     nodes = command(words, "nodes", list_nodes, "list the managed nodes")
     nodes.add_argument("-a", "--all", action="store_true", help="those that begin with '_' too")
-    nodes.add_argument("-c", "--count-nodes", action="store_true", help="only how many there are")
+    add_count(nodes, "--count-nodes")
     listing = command(words, "list", list_transitions, "list the transitions that a node's state has")
     listing.add_argument("node_name", metavar="NODE")
     listing.add_argument("-a", "--all", action="store_true", help="all transitions that the node knows")
@@ -59,9 +60,7 @@ def register(subparsers: Any) -> None:
 async def list_nodes(tool: Tool, arguments: argparse.Namespace) -> None:
     """`muros lifecycle nodes`."""
     await tool.discover()
-    names = _managed(tool, arguments.all)
-    for line in [len(names)] if arguments.count_nodes else names:
-        tool.print(line)
+    print_lines(tool, _managed(tool, arguments.all), count=arguments.count)
 
 
 async def get_state(tool: Tool, arguments: argparse.Namespace) -> int:

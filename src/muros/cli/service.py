@@ -8,6 +8,7 @@ import time
 from typing import Any, Final
 
 from muros import interfaces
+from muros.cli._listing import add_count, find_named, print_found, print_lines
 from muros.cli._names import (
     RosService,
     add_type_options,
@@ -20,7 +21,7 @@ from muros.cli._names import (
     type_of_service,
 )
 from muros.cli._tool import CommandError, Tool, positive
-from muros.cli.topic import command, unknown
+from muros.cli.topic import command
 
 __all__ = ["call", "find_services", "list_services", "register", "service_types"]
 
@@ -34,7 +35,7 @@ def register(subparsers: Any) -> None:
     words = parser.add_subparsers(required=True, metavar="list | type | find | info | call")
     listing = command(words, "list", list_services, "list the services that somebody serves or uses")
     listing.add_argument("-t", "--show-types", action="store_true", help="with the type of each")
-    listing.add_argument("-c", "--count-services", action="store_true", help="only how many there are")
+    add_count(listing, "--count-services")
     listing.add_argument(
         "-a", "--include-hidden-services", action="store_true", help="those that begin with '_' too"
     )
@@ -44,7 +45,7 @@ def register(subparsers: Any) -> None:
     about.add_argument("service_name", metavar="SERVICE")
     find = command(words, "find", find_services, "list the services of a type")
     find.add_argument("service_type", metavar="TYPE")
-    find.add_argument("-c", "--count-services", action="store_true", help="only how many there are")
+    add_count(find, "--count-services")
     find.add_argument("--include-hidden-services", action="store_true", help="hidden services too")
     ask = command(words, "call", call, "call a service and print its answer")
     ask.add_argument("service_name", metavar="SERVICE")
@@ -64,11 +65,7 @@ async def list_services(tool: Tool, arguments: argparse.Namespace) -> None:
     """`muros service list`."""
     await tool.discover()
     services = [s for s in ros_services(tool) if arguments.include_hidden_services or not is_hidden(s.name)]
-    if arguments.count_services:
-        tool.print(len(services))
-        return
-    for service in services:
-        tool.print(service.name + (f" [{', '.join(service.types)}]" if arguments.show_types else ""))
+    print_found(tool, services, count=arguments.count, types=arguments.show_types)
 
 
 async def service_types(tool: Tool, arguments: argparse.Namespace) -> None:
@@ -91,8 +88,7 @@ async def find_services(tool: Tool, arguments: argparse.Namespace) -> None:
     await tool.discover()
     names = [s.name for s in ros_services(tool) if wanted in s.types]
     names = [name for name in names if arguments.include_hidden_services or not is_hidden(name)]
-    for line in [len(names)] if arguments.count_services else names:
-        tool.print(line)
+    print_lines(tool, names, count=arguments.count)
 
 
 async def call(tool: Tool, arguments: argparse.Namespace) -> None:
@@ -176,11 +172,7 @@ async def _served_type(tool: Tool, name: str, timeout: float | None) -> str:
 async def _known_service(tool: Tool, asked: str) -> RosService:
     name = full_name(asked, "service")
     await tool.discover()
-    services = ros_services(tool)
-    for service in services:
-        if service.name == name:
-            return service
-    raise CommandError(unknown("service", name, [s.name for s in services], tool.domain))
+    return find_named(tool, "service", name, ros_services(tool))
 
 
 def _split_words(words: list[str]) -> tuple[str | None, str | None]:
