@@ -190,19 +190,25 @@ class Endpoint(board.Entity):
         self.session.wake()
 
 
-class Requester(Endpoint, services.Requester):
-    """The client's side of a service, for any thread."""
+class _Side(Endpoint):
+    """A side of a service."""
 
-    KIND = 7
+    callback: Any
 
     @property
     def taker(self) -> Any:
-        """What takes replies; it may be exchanged."""
+        """What takes replies or requests; it may be exchanged."""
         return self.callback
 
     @taker.setter
     def taker(self, taker: Any) -> None:
         self.callback = taker
+
+
+class Requester(_Side, services.Requester):
+    """The client's side of a service, for any thread."""
+
+    KIND = 7
 
     def send(self, request: Message) -> int:
         """Sends a request; its number, or 0 when it was not taken."""
@@ -210,16 +216,7 @@ class Requester(Endpoint, services.Requester):
             return super().send(request)
 
 
-class Replier(Endpoint, services.Replier):
+class Replier(_Side, services.Replier):
     """The server's side of a service, for any thread."""
 
     KIND = 8
-
-    @property
-    def taker(self) -> Any:
-        """What takes requests; it may be exchanged."""
-        return self.callback
-
-    @taker.setter
-    def taker(self, taker: Any) -> None:
-        self.callback = taker
