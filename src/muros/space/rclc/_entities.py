@@ -10,6 +10,7 @@ from muros.client.problems import FULL, OFFLINE
 from muros.interfaces import CdrError, InterfaceError
 from muros.interfaces import message as message_class
 from muros.rclc.errors import RclError
+from muros.rclc.host.outlet import body as encode
 from muros.space import _door
 from muros.space._qos import Qos
 from muros.space._values import CDR_BE, CDR_LE, Sample, Service, Topic
@@ -97,7 +98,7 @@ class Publisher(_Entity):
 
     def publish(self, message: Outgoing, /) -> bool:
         """Sends a message; False when it was not taken."""
-        return self.write_bytes(_encode(message))
+        return self.write_bytes(encode(message))
 
     @property
     def matched(self) -> int:
@@ -226,7 +227,7 @@ class Requester(Receiver):
 
     def send(self, request: Message, /) -> int:
         """Sends a request; its number, 0 when it was not taken."""
-        data = _encode(request)
+        data = encode(request)
         with self._lock:
             why = self.gone()
             if not why:
@@ -257,7 +258,7 @@ class Replier(Receiver):
 
     def reply(self, identity: bytes, reply: Message, /) -> bool:
         """Answers the request of that identity; False when who asked is gone."""
-        data = _encode(reply)
+        data = encode(reply)
         with self._lock:
             why = self.gone()
             if not why:
@@ -269,17 +270,6 @@ class Replier(Receiver):
         data = self.body(item.sample, self.type_name + "_Request")
         if data is not None:
             self.callback(item.identity, data, 0, len(data))
-
-
-def _encode(message: Any) -> bytes:
-    """The body of a message; of any that can be written."""
-    serialize = getattr(message, "serialize", None)
-    if serialize is not None:
-        data: bytes = serialize()
-        return data
-    buf = bytearray(message.size())
-    message.write(buf, 0)
-    return bytes(buf)
 
 
 def _topic(name: str, type_name: str) -> Topic:
