@@ -5,6 +5,7 @@ docs/rtc.md. Stubs (`import RTC`) come from one place for all of the process.
 """
 # ruff: noqa: N999
 
+from muros.rtc.corba._top_level import look_for_idl as _look_for_idl
 from OpenRTM_aist import StaticFSM
 from OpenRTM_aist._components import (
     ConfigurationParamListener,
@@ -73,7 +74,6 @@ from OpenRTM_aist._strings import (
     unescape,
     unique_sv,
 )
-from OpenRTM_aist._stubs import look_for_idl as _look_for_idl
 from OpenRTM_aist._tools import help_old_tools as _help_old_tools
 from OpenRTM_aist.StaticFSM import EventInPort
 

@@ -9,6 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from inspect import isfunction
 from types import FrameType
 from typing import Any, ClassVar
 
@@ -242,6 +243,20 @@ class Manager:
 
     def _failed(self, code: str, what: str, error: RtcError) -> None:
         self.core.reporter.report(code, who=self.core.name, what=what, why=str(error), subject=what)
+
+
+def _lent(name: str) -> Callable[..., Any]:
+    def call(core: Core, *arguments: Any, **more: Any) -> Any:
+        return getattr(Manager.of(core), name)(*arguments, **more)
+
+    return call
+
+
+# A manager that muros has made (`muros rtc run`, `muros rtcd`) calls the init functions of old modules with itself:
+# they find the names they know on it.
+for _name, _value in vars(Manager).items():
+    if isfunction(_value) and not _name.startswith("_") and not hasattr(Core, _name):
+        setattr(Core, _name, _lent(_name))
 
 
 def _outer(component: Component) -> Any:

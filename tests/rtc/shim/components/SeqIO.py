@@ -97,10 +97,15 @@ class SeqIn(DataFlowComponentBase):
         return RTC.RTC_OK
 
 
-def MyModuleInit(manager):
+def SeqIOInit(manager):
     for kind in (SeqOut, SeqIn):
         manager.registerFactory(Properties(defaults_str=spec(kind.__name__)), kind, Delete)
-        manager.createComponent(kind.__name__)
+
+
+def MyModuleInit(manager):
+    SeqIOInit(manager)
+    for name in ("SeqOut", "SeqIn"):
+        manager.createComponent(name)
 
 
 def main():
