@@ -53,13 +53,17 @@ class Buffer(Generic[T]):
         self.ring: Final[Ring[T]] = Ring(options.length, options.full_policy, options.empty_policy)
         self.condition: Final = condition or threading.Condition(threading.Lock())
         self.closed = False
+        # What the lock has, without the steps between that cost as much as the rest of a write.
+        self._acquire: Final = self.condition.acquire
+        self._release: Final = self.condition.release
         self._blocks: Final = options.full_policy is FullPolicy.BLOCK
         self._clock = clock
 
     def write(self, value: T) -> tuple[BufferStatus, bool]:
         """Add `value`: OK, FULL, TIMEOUT, or PRECONDITION_NOT_MET of a closed one; and whether one was overwritten."""
-        with self.condition:
-            ring = self.ring
+        ring = self.ring
+        self._acquire()
+        try:
             if self._blocks and ring.full:
                 status = self.wait(lambda: not ring.full, self.options.write_timeout)
                 if status is not BufferStatus.OK:
@@ -71,6 +75,8 @@ class Buffer(Generic[T]):
             if status is BufferStatus.OK and len(ring) == 1:  # nobody waits for one more
                 self.condition.notify_all()
             return status, ring.overwritten != before
+        finally:
+            self._release()
 
     def read(self) -> tuple[BufferStatus, T | None]:
         """Take the oldest: OK, EMPTY, TIMEOUT, or PRECONDITION_NOT_MET of a closed one that has none."""

@@ -124,13 +124,14 @@ class Link:
 
     def tell(self, event: DataEvent, sample: Sample) -> None:
         """Tell who listens; what they change counts for the sample. Nobody: nothing is decoded."""
-        if not self._listeners.hears_values or not self._listeners.hears(event):
+        callbacks = self._listeners.hearing(event)
+        if not callbacks:
             return
         try:
             value = sample.value
         except DataError:
             return  # it is told when it is read
-        changed, value = self._listeners.tell_value(event, self.info, value)
+        changed, value = self._listeners.tell_value(event, callbacks, self.info, value)
         if changed:
             sample.replace(value)
 

@@ -93,33 +93,36 @@ class DataListeners:
         self._connector: Final = Listeners[ConnectorEvent](on_error)
         self.hears_values = False
         """Whether anybody listens to any `DataEvent`: asked with every value."""
+        self._callbacks: dict[DataEvent, tuple[DataCallback, ...]] = {}
 
     def add(
         self, event: DataEvent | ConnectorEvent, callback: Callable[..., object]
     ) -> Callable[..., object]:
         """Tell `callback` of `event` from now on. Returns it."""
-        if isinstance(event, DataEvent):
-            added = self._data.add(event, callback)
-            self.hears_values = True
-            return added
-        return self._connector.add(event, callback)
+        if not isinstance(event, DataEvent):
+            return self._connector.add(event, callback)
+        self._data.add(event, callback)
+        self._note()
+        return callback
 
     def remove(self, event: DataEvent | ConnectorEvent, callback: Callable[..., object]) -> bool:
         """Tell `callback` no longer. False where it was not there."""
-        if isinstance(event, DataEvent):
-            removed = self._data.remove(event, callback)
-            self.hears_values = any(map(self.hears, DataEvent))
-            return removed
-        return self._connector.remove(event, callback)
+        if not isinstance(event, DataEvent):
+            return self._connector.remove(event, callback)
+        removed = self._data.remove(event, callback)
+        self._note()
+        return removed
 
-    def hears(self, event: DataEvent) -> bool:
-        """Whether anybody listens to this one."""
-        return bool(self._data.of(event))
+    def hearing(self, event: DataEvent) -> tuple[DataCallback, ...]:
+        """Who listens to this one."""
+        return self._callbacks.get(event, ())
 
-    def tell_value(self, event: DataEvent, info: ConnectorInfo, value: object) -> tuple[bool, object]:
-        """Tell who listens; whether the value was changed, and the value as it is now."""
+    def tell_value(
+        self, event: DataEvent, callbacks: tuple[DataCallback, ...], info: ConnectorInfo, value: object
+    ) -> tuple[bool, object]:
+        """Tell them; whether the value was changed, and the value as it is now."""
         changed = False
-        for callback in self._data.of(event):
+        for callback in callbacks:
             try:
                 answer = callback(info, value)
             except Exception as error:
@@ -129,7 +132,7 @@ class DataListeners:
                 continue
             if isinstance(answer, tuple) and len(answer) == 2:
                 answer, replacement = answer
-                if answer is not None and answer & Changes.DATA_CHANGED:
+                if isinstance(answer, int) and answer & Changes.DATA_CHANGED:
                     value = replacement
             if isinstance(answer, int) and answer & Changes.DATA_CHANGED:
                 changed = True
@@ -138,3 +141,7 @@ class DataListeners:
     def tell(self, event: ConnectorEvent, info: ConnectorInfo) -> None:
         """Tell who listens."""
         self._connector.tell(event, info)
+
+    def _note(self) -> None:
+        self._callbacks = {event: heard for event in DataEvent if (heard := self._data.of(event))}
+        self.hears_values = bool(self._callbacks)
