@@ -2,6 +2,7 @@
 
 import json
 import threading
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,9 @@ class Stage:
             self.parts[name] = Part(name, self.trace)
             assert self.parts[name].initialize() is OK
 
-    def composite(self, members: str, exported: str = "", **properties: str) -> PeriodicECSharedComposite:
+    def composite(
+        self, members: str, exported: str = "", properties: Mapping[str, str] = {}
+    ) -> PeriodicECSharedComposite:
         composite = PeriodicECSharedComposite(self.parts.get)
         composite.configure(
             "PeriodicECSharedComposite0",
@@ -223,14 +226,17 @@ def test_tools_change_members_by_the_organization(stage: Stage) -> None:
         composite.organization.remove_member("Motor0")
 
 
-def test_exported_ports_of_the_request_that_made_it(stage: Stage) -> None:
-    composite = stage.composite("Motor0", "Motor0.out", exported_ports="Motor0.in,Motor0.out")
+def test_members_and_ports_of_the_request_that_made_it(stage: Stage) -> None:
+    composite = stage.composite(
+        "Motor0", "Motor0.out", exported_ports="Motor0.in,Motor0.out", members="Sensor0"
+    )
+    assert [member.instance_name for member in composite.organization.members] == ["Motor0", "Sensor0"]
     assert [port.full_name for port in composite.ports] == ["Motor0.out", "Motor0.in"]
 
 
 def test_groups_run_side_by_side(stage: Stage) -> None:
     composite = stage.composite(
-        "Motor0,Sensor0|Controller0", **{"exec_cxt.periodic.type": "MultilayerCompositeEC"}
+        "Motor0,Sensor0|Controller0", properties={"exec_cxt.periodic.type": "MultilayerCompositeEC"}
     )
     assert isinstance(composite.context, MultilayerCompositeEC)
     assert composite.context.groups == (("Motor0", "Sensor0"), ("Controller0",))

@@ -8,7 +8,7 @@ organization.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import ClassVar, Final
 
 from muros.findings import Severity
@@ -80,9 +80,8 @@ class PeriodicECSharedComposite(Component):
         self.configuration.bind("exported_ports", "", str)
         self.context.on_event(self._context_event)
         values = self.configuration.get(self.configuration.active_id).values
-        asked = self.properties.get("exported_ports", "")
-        self._exporting = _unique((*split_list(values.get("exported_ports", "")), *split_list(asked)))
-        self._take_members(values.get("members", ""))
+        self._exporting = _unique(split_list(self._said("exported_ports", values)))
+        self._take_members(self._said("members", values))
         for event in (ConfigEvent.SET_CONFIG_SET, ConfigEvent.ADD_CONFIG_SET):
             self.configuration.listeners.add(event, self._set_changed)
         self.configuration.listeners.add(ConfigEvent.ACTIVATE_CONFIG_SET, self._set_activated)
@@ -113,6 +112,10 @@ class PeriodicECSharedComposite(Component):
         return OK
 
     # Members
+
+    def _said(self, key: str, values: Mapping[str, str]) -> str:
+        """What the configuration says, and what the request that made it said beside that."""
+        return ",".join(filter(None, (values.get(key, ""), self.properties.get(key, ""))))
 
     def _take_members(self, text: str) -> None:
         """Have the members that a text names: `a,b`, or `a,b|c,d` in groups that run side by side."""
