@@ -227,9 +227,8 @@ def test_tools_change_members_by_the_organization(stage: Stage) -> None:
 
 
 def test_members_and_ports_of_the_request_that_made_it(stage: Stage) -> None:
-    composite = stage.composite(
-        "Motor0", "Motor0.out", exported_ports="Motor0.in,Motor0.out", members="Sensor0"
-    )
+    request = {"exported_ports": "Motor0.in,Motor0.out", "members": "Sensor0"}
+    composite = stage.composite("Motor0", "Motor0.out", request)
     assert [member.instance_name for member in composite.organization.members] == ["Motor0", "Sensor0"]
     assert [port.full_name for port in composite.ports] == ["Motor0.out", "Motor0.in"]
 
