@@ -4,6 +4,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -211,6 +212,40 @@ def test_addresses_of_other_processes(
     for wrong in ("rtcname://*/Nobody", f"rtcloc://127.0.0.1:{port}/test/Nobody", "ftp://x/y"):
         with pytest.raises(RtcError, match=r"no such component|write rtcname"):
             world.activate_at(wrong)
+
+
+STUCK = """
+import threading
+from muros.rtc import Component
+class Stuck(Component):
+    def on_execute(self, context):
+        print("stuck", flush=True)
+        threading.Event().wait()
+"""
+
+
+def test_a_component_that_hangs_does_not_hold_up_the_end(managers: Managers, world: CorbaWorld) -> None:
+    (managers.folder / "Stuck.py").write_text(STUCK)
+    process = managers.start(
+        *("-o", "manager.components.precreate:Stuck, Wheel", "-o", "manager.components.preactivation:Stuck0")
+    )
+    managers.wait_for(process, "stuck")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(20) == 0
+    assert "Stuck0 does not end: one of its actions has not returned for 1 s" in managers.said(process)
+    assert world.instance_names() == set()
+
+
+def test_a_name_server_that_hangs_does_not_hold_up_the_start(managers: Managers) -> None:
+    """It takes connections and says nothing: components are there all the same."""
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"127.0.0.1:{silent.getsockname()[1]}"
+        process = managers.start(
+            "-o", f"corba.nameservers:{address}", "-o", "manager.components.precreate:Wheel, Wheel"
+        )
+        assert "component Wheel1 is there" in managers.said(process)
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(30) == 0
 
 
 @pytest.mark.parametrize(

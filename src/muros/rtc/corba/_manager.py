@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Final
 
+import omniORB
 from omniORB import any
 
 from muros.rtc.codes import PeerLostError, ReturnCode, RtcError
 from muros.rtc.corba._conversion import to_nv_list, to_return_code
 from muros.rtc.corba._lost import peer
-from muros.rtc.corba._naming import Names, NameServer, is_same, lives
+from muros.rtc.corba._naming import Names, NameServer, is_same, lives, split_path
 from muros.rtc.corba._orb import Orb, current_orb, start_orb
 from muros.rtc.corba._organization import ForeignMember
 from muros.rtc.corba._setup import set_up
@@ -31,6 +33,9 @@ DEFAULT_KEY: Final = "manager"
 
 MASTER_PORT: Final = 2810
 """TCP port of a master manager whose address has none."""
+
+NAME_TIMEOUT: Final = 2.0
+"""Seconds that one question to a name server may take."""
 
 AWAY: Final = 5.0
 """Seconds for which a name server that did not answer is not asked whether names are free."""
@@ -284,7 +289,7 @@ class CorbaWorld:
         for name in names:
             try:
                 if self.is_free(name):
-                    self._names.bind(name, reference)
+                    self._bind(name, reference)
                     continue
             except RtcError as error:
                 self._tell_name(name, str(error), "Mend naming.formats")
@@ -297,12 +302,24 @@ class CorbaWorld:
                 "Give it another instance_name, or end the other one: it is bound as soon as the name is free",
             )
 
+    def _bind(self, name: str, reference: Any) -> None:
+        """Bind a name; where a server is away this goes on in the background, so that nobody waits for it."""
+        split_path(name)
+        if len(self._answering()) == len(self._names.servers):
+            with _patience(NAME_TIMEOUT):
+                self._names.bind(name, reference)
+        else:
+            threading.Thread(
+                target=self._names.bind, args=(name, reference), name="rtc-names", daemon=True
+            ).start()
+
     def unbind(self, names: Iterable[str]) -> None:
         for name in names:
             with self._lock:
                 waited = self._waiting.pop(name, None)
             if waited is None and name in self._names.bound:
-                self._names.unbind(name)
+                with _patience(NAME_TIMEOUT):
+                    self._names.unbind(name)
 
     def update_names(self) -> None:
         self._names.update()
@@ -315,14 +332,15 @@ class CorbaWorld:
                     self._waiting.pop(name, None)
 
     def is_free(self, name: str) -> bool:
-        for server in self._answering():
-            try:
-                bound = server.resolve(name)
-            except PeerLostError:
-                self._asked[server.address] = time.monotonic()
-                continue
-            if bound is not None and not is_same(bound, self._names.bound.get(name)) and lives(bound):
-                return False
+        with _patience(NAME_TIMEOUT):
+            for server in self._answering():
+                try:
+                    bound = server.resolve(name)
+                except PeerLostError:
+                    self._asked[server.address] = time.monotonic()
+                    continue
+                if bound is not None and not is_same(bound, self._names.bound.get(name)) and lives(bound):
+                    return False
         return True
 
     def instance_names(self) -> set[str]:
@@ -395,7 +413,8 @@ class CorbaWorld:
                     raise RtcError(f"{address} cannot be activated: {code}")
 
     def close(self) -> None:
-        self._names.unbind_all()
+        with _patience(NAME_TIMEOUT):
+            self._names.unbind_all()
         if self._owns_orb:
             self._orb.shutdown()
 
@@ -416,6 +435,16 @@ class CorbaWorld:
             if component is not None:
                 return component
         raise RtcError(f"{address}: there is no such component")
+
+
+@contextmanager
+def _patience(seconds: float) -> Iterator[None]:
+    """Calls of this thread to other processes take no longer than that, inside the block."""
+    omniORB.setClientThreadCallTimeout(round(seconds * 1000))
+    try:
+        yield
+    finally:
+        omniORB.setClientThreadCallTimeout(0)
 
 
 def any_same(references: Iterable[Any], one: Any) -> bool:

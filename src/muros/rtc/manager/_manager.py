@@ -17,6 +17,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Final
 
+from muros.findings import Severity
 from muros.rtc.actions import ComponentEvent
 from muros.rtc.codes import ReturnCode, RtcError
 from muros.rtc.component import Component
@@ -44,6 +45,9 @@ from muros.rtc.properties import ConfError, Properties, split_list
 from muros.rtc.reports import Reporter
 
 __all__ = ["CreateError", "Manager", "ManagerEvent"]
+
+LEAST_WAIT: Final = 1.0
+"""Seconds that a component's end may take at least; `manager.termination_waittime` may allow more."""
 
 CONNECT_AGAIN: Final = 1.0
 """Seconds after which a connection of `preconnect` is tried again while one of its components is missing."""
@@ -158,6 +162,7 @@ class Manager:
         self._world = world = (self._make_world or _corba_world)(self)
         self.settings.update(world.properties())
         self._colleagues = Colleagues(world, self.settings, self.reporter)
+        self._bind_to_processors()
         self.log.logger.info(
             "manager %s starts (pid %s, %s)",
             self.name,
@@ -210,8 +215,7 @@ class Manager:
                 return
             self._closed = True
         self.timer.close()
-        for component in reversed(self.components):
-            self._try("exit", component.instance_name, component.exit)
+        self._end_components()
         if self._colleagues is not None:
             self._colleagues.close()
         if self._world is not None:
@@ -517,6 +521,27 @@ class Manager:
         else:
             self._shut_down_when_empty()
 
+    def _end_components(self) -> None:
+        """End all, the youngest first. One whose actions do not come to an end is left behind, and says so."""
+        waittime = max(LEAST_WAIT, self.settings.number("manager.termination_waittime", 1.0))
+        for component in reversed(self.components):
+            name = component.instance_name
+            ending = threading.Thread(
+                target=self._try, args=("exit", name, component.exit), name=f"rtc-end-{name}", daemon=True
+            )
+            ending.start()
+            ending.join(waittime)
+            if ending.is_alive():
+                self.reporter.report(
+                    "component-hangs",
+                    who=name,
+                    what=f"{name} does not end",
+                    why=f"one of its actions has not returned for {waittime:g} s; it is left behind",
+                    remedy="Let actions return soon: what takes long belongs into a thread of the component's own",
+                    severity=Severity.ERROR,
+                )
+                self._component_ended(component)
+
     # Small things
 
     def _fields(self, name: str = "", properties: Mapping[str, str] | None = None) -> Fields:
@@ -554,11 +579,22 @@ class Manager:
         beside = Path(self.settings.get("config_file", "")).parent / name
         return beside if not path.is_file() and beside.is_file() else path
 
+    def _bind_to_processors(self) -> None:
+        words = self.settings.words("manager.cpu_affinity")
+        if words:
+            try:
+                os.sched_setaffinity(0, [int(word) for word in words])
+            except (ValueError, OSError) as error:
+                raise ConfError(
+                    f"manager.cpu_affinity: {', '.join(words)}: {error}; write numbers of processors, such as 0,1"
+                ) from error
+
     def _every(self, key: str, task: Callable[[], object]) -> None:
         period = self.settings.number(key, float(DEFAULTS[key]))
         if period <= 0:
             raise ConfError(f"{key}: {period:g} is no interval; write seconds, more than 0")
-        self.timer.every(period, task)
+        if self.settings.flag("timer.enable"):
+            self.timer.every(period, task)
 
     def _shut_down_when_empty(self) -> None:
         """End if nothing has been made when the time is over."""
