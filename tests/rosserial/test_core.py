@@ -661,6 +661,30 @@ def test_the_server_says_goodbye() -> None:
     assert not board.connected
 
 
+def test_nothing_comes_after_the_goodbye() -> None:
+    """A board that were asked again would publish to nobody until it gives up."""
+    scene = Scene()
+    board, led, _ = led_board(scene)
+    switch = scene.writer("/led_out", BYTE)
+    scene.step(1_000)
+    scene.core.stop()
+    scene.step(1)
+    board.got.clear()
+    for _ in range(40):
+        switch(data=1)
+        board._ask_time()
+        board.send(99, b"no such id")
+        scene.step(100)
+    assert not board.got
+    assert not board.connected
+    board.pull()
+    board.plug()
+    scene.step(400)
+    switch(data=2)
+    scene.step(2)
+    assert board.taken(led)[-1:] == [b"\x02"]
+
+
 def test_damage_is_counted_told_and_passed_over() -> None:
     scene = Scene()
     board, _, chatter = led_board(scene)

@@ -235,9 +235,7 @@ class Board:
     def stop(self) -> None:
         """Tells the board that nobody listens any more, so that it waits to be asked."""
         if self.state != AWAY and self.version:
-            self.output.clear()
-            self.output.post(frame(ID_TX_STOP, b"", self.version))
-            self.output.pump(self._now)
+            self.output.end(frame(ID_TX_STOP, b"", self.version), self.core.clock())
 
     def close(self) -> None:
         """Takes everything of it out of the world."""

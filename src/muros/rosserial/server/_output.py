@@ -66,10 +66,11 @@ class Output:
         self._ready: deque[Source] = deque()
         self._free_us = 0.0
         self._stalled: int | None = None
+        self._ended = False
 
     def post(self, frame: bytes | Callable[[int], bytes]) -> bool:
         """Has a frame sent before all topics, one made by ``frame(now)`` when its turn has come; False if many wait."""
-        if len(self._urgent) >= self._room:
+        if self._ended or len(self._urgent) >= self._room:
             self.dropped += 1
             return False
         self._urgent.append(frame)
@@ -85,15 +86,23 @@ class Output:
             self._ready.remove(source)
 
     def clear(self) -> None:
-        """Forgets what is urgent: the line is gone."""
+        """Forgets what is urgent: the line is gone, or new."""
         self._urgent.clear()
         self._free_us = 0.0
+        self._ended = False
+
+    def end(self, frame: bytes, now: int) -> None:
+        """Sends a last frame; nothing goes after it until `clear`."""
+        self._urgent.clear()
+        self._urgent.append(frame)
+        self._ended = True
+        self.pump(now)
 
     def pump(self, now: int) -> int | None:
         """Sends what can be sent at ``now``; returns when to call again if something is left."""
         urgent, ready = self._urgent, self._ready
         now_us = 1000 * now
-        while urgent or (ready and not self.holds):
+        while urgent or (ready and not (self.holds or self._ended)):
             if self._free_us > now_us + self._lead_us:
                 return now + max(1, int(self._free_us - now_us - self._lead_us) // 1000)
             if self.link.backlog(self.address):
@@ -131,7 +140,7 @@ class Output:
             if urgent:
                 first = urgent.popleft()
                 frame = first if isinstance(first, bytes) else first(now)
-            elif ready and not self.holds:
+            elif ready and not (self.holds or self._ended):
                 source = ready.popleft()
                 frame = source.next(now)
                 if frame is None:
