@@ -1,7 +1,9 @@
 """Composites: whose context runs whom, what is exported, how tools change it."""
 
+import gc
 import json
 import threading
+import weakref
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -336,3 +338,15 @@ def test_two_tools_at_once_leave_one_of_both_wishes(stage: Stage) -> None:
     (member,) = composite.organization.members
     assert [str(p) for p in composite.context.participants] == [f"<{member.instance_name}>"]
     composite.exit()
+
+
+def test_nothing_is_kept_of_what_has_ended(stage: Stage) -> None:
+    composite = stage.composite("Motor0,Sensor0", "Motor0.out")
+    composite.context.activate_component(composite.participation)
+    composite.exit()
+    gone: list[weakref.ref[Any]] = [
+        weakref.ref(one) for one in (composite, composite.context, composite.organization)
+    ]
+    del composite
+    gc.collect()
+    assert [reference() for reference in gone] == [None] * 3

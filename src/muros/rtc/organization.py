@@ -11,7 +11,6 @@ import uuid
 from collections.abc import Callable, Iterable
 from enum import IntEnum
 from typing import TYPE_CHECKING, Final, Protocol
-from weakref import WeakKeyDictionary
 
 from muros.rtc.codes import LifeCycleState, RtcError
 
@@ -166,14 +165,14 @@ class Organizations:
         return found
 
 
-_organizations: Final[WeakKeyDictionary[Component, Organizations]] = WeakKeyDictionary()
-_organizations_lock: Final = threading.Lock()
+_lock: Final = threading.Lock()
 
 
 def organizations_of(component: Component) -> Organizations:
     """The organizations of a component of this process."""
-    with _organizations_lock:
-        return _organizations.setdefault(component, Organizations())
+    with _lock:  # they live as long as the component, which knows nothing of them
+        found: Organizations = vars(component).setdefault("_organizations", Organizations())
+        return found
 
 
 class LocalMember:

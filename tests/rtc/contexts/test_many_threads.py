@@ -1,13 +1,16 @@
 """Contexts that several threads use at once: nothing hangs, callbacks do not overlap, every life is a legal one."""
 
+import gc
 import random
 import threading
+import weakref
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from muros.rtc.codes import ReturnCode
+from muros.rtc.component import Component
 from muros.rtc.contexts import (
     CONTEXT_TYPES,
     ContextOptions,
@@ -17,6 +20,8 @@ from muros.rtc.contexts import (
     PeriodicExecutionContext,
     SynchronousExecutionContext,
 )
+from muros.rtc.observers import Dialect, Observer, ObserverOptions
+from muros.rtc.status import watch
 from tests.rtc.contexts.actors import Actor
 
 SOON = 30.0
@@ -152,3 +157,25 @@ def test_threads_of_contexts_end_with_them() -> None:
         if thread.name.startswith("rtc "):
             thread.join(SOON)
     assert threading.active_count() <= before
+
+
+def test_nothing_is_kept_of_contexts_that_have_ended() -> None:
+    gone: list[weakref.ref[Any]] = []
+    for kind in (PeriodicExecutionContext, MultilayerCompositeEC, SynchronousExecutionContext):
+        component = Component()
+        observer = Observer(
+            lambda kind, hint: None, ObserverOptions.from_properties({}, Dialect.RTC), Dialect.RTC
+        )
+        context = kind()
+        component.initialize([context])
+        watch(component, observer)
+        context.activate_component(component.participation)
+        observer.close()
+        component.exit()
+        gone += [weakref.ref(component), weakref.ref(context), weakref.ref(observer)]
+        del component, context, observer
+    for thread in threading.enumerate():
+        if thread.name.startswith("rtc "):
+            thread.join(SOON)
+    gc.collect()
+    assert [reference() for reference in gone] == [None] * 9
