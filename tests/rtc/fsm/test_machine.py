@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import pytest
@@ -243,4 +244,6 @@ class TestStructure:
         )
         assert service.set_fsm_structure(structure) is ReturnCode.RTC_OK
         assert service.set_fsm_structure(FsmStructure("Oven", "<scxml/>")) is ReturnCode.UNSUPPORTED
+        other_events = replace(structure, event_profiles=structure.event_profiles[1:])
+        assert service.set_fsm_structure(other_events) is ReturnCode.UNSUPPORTED
         assert heard == [structure, structure]

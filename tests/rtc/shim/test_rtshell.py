@@ -55,3 +55,16 @@ def test_rtlog_records_and_plays(stage: Stage, tmp_path: Path) -> None:
                       "@SeqIn0.rtc:Text.text", "@SeqIn0.rtc:Octet.octet", "@SeqIn0.rtc:Double.double")  # fmt: skip
     assert done.returncode == 0, done
     program.said("got")
+
+
+def test_rtfsm_asks_for_a_state_machine(stage: Stage) -> None:
+    """No component of the original package answers it."""
+    stage.python("Turnstile")
+    stage.activate("Turnstile0")
+    assert stage.tool("rtfsm", "@Turnstile0.rtc", "getstate").stdout.split() == ["Locked"]
+    profiles = stage.tool("rtfsm", "@Turnstile0.rtc", "geteventprofiles").stdout
+    assert profiles.strip() == "coin:IDL:RTC/TimedLong:1.0, push:"
+    assert (
+        '<transition event="coin" target="Unlocked" />'
+        in stage.tool("rtfsm", "@Turnstile0.rtc", "getstructure").stdout
+    )

@@ -33,21 +33,27 @@ class ExtendedFsmService:
 
     def get_fsm_structure(self) -> FsmStructure:
         """The machine's structure."""
-        types = self._data_types()
-        top = self.machine.top
-        events = dict.fromkeys([*events_of(top), *types])
-        structure = FsmStructure(
-            top.__name__, scxml(top), tuple(FsmEventProfile(name, types.get(name, "")) for name in events)
-        )
+        structure = self._structure()
         self.machine.listeners.tell(FsmEvent.GET_FSM_STRUCTURE, structure)
         return structure
 
     def set_fsm_structure(self, structure: FsmStructure) -> ReturnCode:
         """RTC_OK for the structure that it has; UNSUPPORTED for others: what states do is written in their classes."""
-        if structure.structure.split() != scxml(self.machine.top).split():
+        own = self._structure()
+        if structure.structure.split() != own.structure.split() or set(structure.event_profiles) != set(
+            own.event_profiles
+        ):
             return ReturnCode.UNSUPPORTED
         self.machine.listeners.tell(FsmEvent.SET_FSM_STRUCTURE, structure)
         return ReturnCode.RTC_OK
+
+    def _structure(self) -> FsmStructure:
+        types = self._data_types()
+        top = self.machine.top
+        events = dict.fromkeys([*events_of(top), *types])
+        return FsmStructure(
+            top.__name__, scxml(top), tuple(FsmEventProfile(name, types.get(name, "")) for name in events)
+        )
 
 
 _services: WeakKeyDictionary[object, ExtendedFsmService] = WeakKeyDictionary()
