@@ -247,7 +247,8 @@ class CorbaWorld:
         self._reporter = reporter
         self._owns_orb = not _runs()
         self._orb: Final[Orb] = start_orb(
-            _endpoints(settings), arguments=settings.get("corba.args", "").split()
+            _endpoints(settings),
+            arguments=["-ORBsupportPerThreadTimeOut", "1", *settings.get("corba.args", "").split()],
         )
         servers = settings.words("corba.nameservers") if settings.flag("naming.enable") else ()
         self._names: Final = Names(self._orb, servers, report=reporter.take)
@@ -255,6 +256,8 @@ class CorbaWorld:
         self._waiting: dict[str, Any] = {}
         """Names that living objects of others have."""
         self._asked: dict[str, float] = {}
+        """When each name server did not answer last."""
+        self._asking: list[threading.Thread] = []
         self._lock = threading.Lock()
         self._manager: ManagerServant | None = None
         self._objects: Final = set_up(self._orb, report=reporter.take)
@@ -305,21 +308,35 @@ class CorbaWorld:
     def _bind(self, name: str, reference: Any) -> None:
         """Bind a name; where a server is away this goes on in the background, so that nobody waits for it."""
         split_path(name)
-        if len(self._answering()) == len(self._names.servers):
-            with _patience(NAME_TIMEOUT):
-                self._names.bind(name, reference)
-        else:
-            threading.Thread(
-                target=self._names.bind, args=(name, reference), name="rtc-names", daemon=True
-            ).start()
+        self._ask(lambda: self._names.bind(name, reference))
 
     def unbind(self, names: Iterable[str]) -> None:
         for name in names:
             with self._lock:
                 waited = self._waiting.pop(name, None)
             if waited is None and name in self._names.bound:
-                with _patience(NAME_TIMEOUT):
-                    self._names.unbind(name)
+                self._ask(lambda name=name: self._names.unbind(name))  # type: ignore[misc]
+
+    def _ask(self, question: Callable[[], object]) -> None:
+        """Ask all name servers; in the background where one of them is away, so that nobody waits for it."""
+
+        def ask() -> None:
+            begin = time.monotonic()
+            with _patience(NAME_TIMEOUT):
+                question()
+            if time.monotonic() - begin > NAME_TIMEOUT:  # one has not answered; which one, only `Names` knows
+                self._asked.update(
+                    dict.fromkeys((one.address for one in self._names.servers), time.monotonic())
+                )
+
+        if len(self._answering()) == len(self._names.servers):
+            ask()
+            return
+        thread = threading.Thread(target=ask, name="rtc-names", daemon=True)
+        with self._lock:
+            self._asking = [one for one in self._asking if one.is_alive()]
+            self._asking.append(thread)
+        thread.start()
 
     def update_names(self) -> None:
         self._names.update()
@@ -413,8 +430,10 @@ class CorbaWorld:
                     raise RtcError(f"{address} cannot be activated: {code}")
 
     def close(self) -> None:
-        with _patience(NAME_TIMEOUT):
-            self._names.unbind_all()
+        self._ask(self._names.unbind_all)
+        end = time.monotonic() + 2 * NAME_TIMEOUT
+        for thread in self._asking:
+            thread.join(max(0.0, end - time.monotonic()))
         if self._owns_orb:
             self._orb.shutdown()
 
