@@ -115,6 +115,31 @@ def test_a_groovy_board_that_talks_is_left_alone() -> None:
     assert scene.core.boards[0].asks == 1
 
 
+def test_a_groovy_board_that_waits_for_an_answer_is_not_asked() -> None:
+    """A request for topics ends its call: ros_lib's wait ends with its spinOnce(), which then returns -1."""
+    scene = Scene(baud=57_600)
+    board = RosLib(scene, version=VERSION_GROOVY)
+    requests, responses = board.client("switch", "std_srvs/SetBool")
+    calls: list[object] = []
+    scene.server("/switch", "std_srvs/srv/SetBool", calls.append)
+    Uart(board, 57_600)
+    board.plug()
+    scene.step(1_000)
+    asks = scene.core.boards[0].asks
+    board.send(requests, b"\x01")
+    scene.step(9_000)
+    assert len(calls) == 1
+    assert scene.core.boards[0].asks == asks
+    assert not board.taken(responses)
+    restart(scene, board, 0)
+    assert (
+        scene.until(lambda: board.connected, within=12_000) <= 3_700
+    )  # also then, by the time it does not ask for
+    scene.step(12_000)
+    restart(scene, board, 0)
+    assert scene.until(lambda: board.connected) <= 2_000
+
+
 def test_a_quiet_groovy_board_that_is_well_loses_nothing() -> None:
     """It is asked, as nothing else tells whether it has restarted, and stands still as long as its list is on the line.
 

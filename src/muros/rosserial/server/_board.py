@@ -341,9 +341,14 @@ class Board:
             self.output.post(CHECK)
 
     def _patience(self) -> int:
-        """How long it may show no sign of being connected. Boards of Groovy cannot be checked, only asked."""
+        """How long it may show no sign of being connected.
+
+        Boards of Groovy cannot be checked, only asked, which ends a call that they wait for.
+        """
         limits = self.core.limits
-        return min(limits.silent, limits.quiet) if self.version == VERSION_GROOVY else limits.silent
+        if self.version != VERSION_GROOVY or self.roster.calls(self._now - limits.lost):
+            return limits.silent
+        return min(limits.silent, limits.quiet)
 
     def _repeats(self) -> bool:
         """Whether a topic request got lost, as the board says something and has not named what it has."""
@@ -362,8 +367,8 @@ class Board:
     # Negotiation
 
     def ask(self, now: int) -> None:
-        """Asks a board that should be well whether it is: it names what it has."""
-        if self.state == SYNCED:
+        """Asks a board that should be well whether it is, unless that would end a call: it names what it has."""
+        if self.state == SYNCED and not self.roster.calls(now - self.core.limits.lost):
             self._ask(now)
             self._plan(now)
 

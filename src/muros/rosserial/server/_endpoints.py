@@ -334,8 +334,14 @@ class ServiceClient(Endpoint):
         super().__init__(board, infos, NO_SHAPE)
         self.caller: Caller | None = None
         self._waiting: deque[int] = deque()
+        self.called_at = 0
         self._calling = False
         self._early: list[tuple[int, bytes]] = []
+
+    @property
+    def waits(self) -> bool:
+        """Whether the board has no answer yet."""
+        return bool(self._waiting)
 
     def begin(self, caller: Caller) -> None:
         """Its counterpart is there."""
@@ -360,6 +366,7 @@ class ServiceClient(Endpoint):
             number = 0
         self._calling = False
         if number:
+            self.called_at = now
             self._waiting.append(number)
             if len(self._waiting) > self.board.core.limits.max_requests:
                 self._waiting.popleft()

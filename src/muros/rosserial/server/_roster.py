@@ -107,6 +107,14 @@ class Roster:
         """How many there are of a kind."""
         return sum(isinstance(each, kind) for each in self.endpoints.values())
 
+    def calls(self, since: int) -> bool:
+        """Whether the board waits for the answer to a call that it has made since then."""
+        return any(
+            each.waits and each.called_at > since
+            for each in self.endpoints.values()
+            if isinstance(each, ServiceClient)
+        )
+
     def tick(self, now: int) -> None:
         """Does what is due."""
         for endpoint in list(self.endpoints.values()):
