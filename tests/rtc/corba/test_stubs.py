@@ -24,6 +24,12 @@ def test_every_type_of_the_rtc_world_is_there() -> None:
     assert not missing
 
 
+def test_values_print_as_programs_write_them() -> None:
+    stubs = _stubs.RTC
+    value = stubs.TimedLong(stubs.Time(1, 2), 3)
+    assert repr(value) == "RTC.TimedLong(tm=RTC.Time(sec=1, nsec=2), data=3)"
+
+
 def test_members_are_called_as_in_the_rtc_world_of_today() -> None:
     for name, layout in _load("idl_types.json").items():
         if layout["kind"] == "struct":

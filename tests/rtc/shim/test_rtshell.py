@@ -17,10 +17,10 @@ def test_rtinject_writes_to_a_port(stage: Stage) -> None:
     stage.component("ConsoleOut0")
     stage.activate("ConsoleOut0")
     done = stage.tool(
-        "rtinject", "-n", "20", "-r", "50", "-c", "RTC.TimedLong(RTC.Time(0,0),21)", "@ConsoleOut0.rtc:in"
+        "rtinject", "-n", "20", "-r", "50", "-c", "RTC.TimedLong({time},21)", "@ConsoleOut0.rtc:in"
     )
     assert (done.returncode, done.stderr) == (0, "")
-    assert len(program.said("Received: 42 stamped False")) >= 10
+    assert len(program.said("Received: 42 stamped True")) >= 10
     typed = "".join(f"RTC.TimedLong(RTC.Time(0,0),{n})\n" for n in range(5))
     done = stage.tool("rtinject", "-n", "5", "-r", "20", "@ConsoleOut0.rtc:in", typed=typed)
     assert (done.returncode, done.stderr) == (0, "")

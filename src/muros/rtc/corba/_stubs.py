@@ -65,6 +65,13 @@ def _complete_manager() -> None:
         setattr(RTM._objref_Manager, name, invoke)
 
 
+def _name_as_programs_do(module: ModuleType) -> None:
+    """Let values print as programs write them, `RTC.Time(sec=1, nsec=2)`: rtinject makes values of such texts."""
+    for value in vars(module).values():
+        if isinstance(value, type) and value.__module__ == module.__name__:
+            value.__module__ = module.__name__.removeprefix(_PACKAGE)
+
+
 CSP: Final = _new_module("CSP")
 CSP__POA: Final = _new_module("CSP__POA")
 _complete_manager()
@@ -82,3 +89,6 @@ MODULES: Final[dict[str, ModuleType]] = {
     )
 }
 """The modules by the names that programs know them by."""
+
+for _module in MODULES.values():
+    _name_as_programs_do(_module)
