@@ -239,6 +239,13 @@ def test_many_values_keep_their_order(both: Pair) -> None:
     assert [both.in_.read().data for _ in range(500)] == list(range(500))
 
 
+def test_why_nothing_comes_is_told(both: Pair) -> None:
+    join(both.in_)
+    join(both.out, qos="sensor_data")
+    wait_for(lambda: bool(both.findings))
+    assert "the reader wants reliable, the writer offers best effort" in both.findings[0].format()
+
+
 def test_an_inport_that_blocks_holds_up_nobody_else(both: Pair) -> None:
     other = Pair()
     entered, leave = threading.Event(), threading.Event()

@@ -40,7 +40,11 @@ FAN_LIMIT: Final = 100
 
 
 class DataPort(Port, Generic[T]):
-    """A port that values of one data type go through."""
+    """A port that values of one data type go through.
+
+    `properties` go into its profile, `report` takes findings. `clock` (seconds, monotonic) is what time-outs are measured
+    by, `wall` (ns since the epoch) what `timestamp_policy` sets.
+    """
 
     side: ClassVar[Side]
     calls: ClassVar[Dataflow]

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import itertools
 import threading
+import time
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar, Final, TypeVar
 
+from muros.findings import Finding
 from muros.rtc.codes import BufferStatus, DataPortStatus, PortStatus, PortType, ReturnCode
 from muros.rtc.data._links import InLink, Link, PullFetcher, PullSource, PushReceiver
 from muros.rtc.data._listeners import ConnectorEvent, DataEvent
@@ -16,6 +18,7 @@ from muros.rtc.data._ring import EmptyPolicy, FullPolicy
 from muros.rtc.data._samples import Sample, copy_value
 from muros.rtc.data._transports import TRANSPORTS, Connection
 from muros.rtc.data._types import DataError, DataType
+from muros.rtc.ports import PortOwner
 
 __all__ = ["DataInPort"]
 
@@ -42,9 +45,12 @@ class DataInPort(DataPort[T]):
         properties: Mapping[str, str] = {},
         *,
         initial: T | None = None,
-        **more: Any,
+        owner: PortOwner | None = None,
+        report: Callable[[Finding], object] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        wall: Callable[[], int] = time.time_ns,
     ) -> None:
-        super().__init__(name, data_type, properties, **more)
+        super().__init__(name, data_type, properties, owner=owner, report=report, clock=clock, wall=wall)
         self.on_read: Callable[[], object] | None = None
         """Called before every read."""
         self.on_read_convert: Callable[[T], T] | None = None

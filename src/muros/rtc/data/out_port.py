@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, TypeVar, cast
+from typing import ClassVar, TypeVar, cast
 
+from muros.findings import Finding
 from muros.rtc.codes import DataPortStatus, PortType, ReturnCode
 from muros.rtc.data._links import Link, OutLink, PullSource, PushReceiver, PushSender
 from muros.rtc.data._options import Dataflow, DataOptions, OptionError, Side, Stamp
@@ -12,6 +14,7 @@ from muros.rtc.data._port import DIRECT, DataPort
 from muros.rtc.data._samples import Outgoing, stamp
 from muros.rtc.data._transports import TRANSPORTS, Connection
 from muros.rtc.data._types import DataType
+from muros.rtc.ports import PortOwner
 
 __all__ = ["DataOutPort"]
 
@@ -34,9 +37,13 @@ class DataOutPort(DataPort[T]):
         name: str,
         data_type: DataType[T],
         properties: Mapping[str, str] = {},
-        **more: Any,
+        *,
+        owner: PortOwner | None = None,
+        report: Callable[[Finding], object] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        wall: Callable[[], int] = time.time_ns,
     ) -> None:
-        super().__init__(name, data_type, properties, **more)
+        super().__init__(name, data_type, properties, owner=owner, report=report, clock=clock, wall=wall)
         self.on_write: Callable[[T], object] | None = None
         """Called with every value before it is sent."""
         self.on_write_convert: Callable[[T], T] | None = None
