@@ -346,6 +346,34 @@ def test_ports_come_and_go(orb: Orb, pair: Pair) -> None:
         pair.in_blob.get_port_profile()
 
 
+def test_nothing_grows_with_connections(orb: Orb, pair: Pair) -> None:
+    def connect_and_end(interface: str) -> None:
+        asked = request(
+            pair.out, pair.inp, **{**PUSH, "interface_type": interface, "subscription_type": "new"}
+        )
+        code, profile = pair.out.connect(asked)
+        assert code == RTC.RTC_OK
+        pair.source.out.write(number(1))
+        assert pair.inp.disconnect(profile.connector_id) == RTC.RTC_OK
+
+    for interface in ("corba_cdr", "shared_memory"):
+        connect_and_end(interface)
+    before = len(orb.servants), threading.active_count(), len(os.listdir("/proc/self/fd"))
+    for number_of in range(60):
+        connect_and_end(("corba_cdr", "shared_memory", "data_service")[number_of % 3])
+    after = len(orb.servants), threading.active_count(), len(os.listdir("/proc/self/fd"))
+    assert all(now <= then + 1 for now, then in zip(after, before, strict=True)), (before, after)
+
+
+def test_who_has_ended_does_not_come_back_by_being_mentioned(orb: Orb, pair: Pair) -> None:
+    port, component = pair.sink.ports[0], pair.sink
+    pair.sink.exit()
+    pair.objects.withdraw(pair.sink)
+    assert pair.objects.port(port)._is_equivalent(pair.inp)
+    assert pair.objects.port(port)._non_existent()
+    assert pair.objects.component(component)._non_existent()
+
+
 class Watcher(OpenRTM__POA.ComponentObserver):  # type: ignore[misc]
     def __init__(self) -> None:
         self.heard = queue.Queue[tuple[str, str]]()

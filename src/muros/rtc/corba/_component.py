@@ -38,10 +38,12 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
         self._observers: Final = Observers(component)
         self._configuration = ConfigurationServant(component, self._observers, objects)
         self._fsm: FsmServant | None = None
+        self._closed = False
         component.listeners.add(ComponentEvent.REMOVE_PORT, objects.drop_port)
 
     def close(self) -> None:
         """End what stands behind it: observers, configuration, state machine service."""
+        self._closed = True
         self.component.listeners.remove(ComponentEvent.REMOVE_PORT, self._objects.drop_port)
         self._observers.close()
         for servant in (self._configuration, self._fsm):
@@ -194,6 +196,8 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
         return self.get_service_profile(id).service
 
     def get_configuration(self) -> Any:
+        if self._closed:
+            raise SDOPackage.NotAvailable(f"{self.component.instance_name} has ended")
         return self._objects.orb.activate(self._configuration)
 
     def get_monitoring(self) -> Any:
@@ -207,7 +211,7 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
 
     def _fsm_service(self) -> Any | None:
         service = fsm_service_of(self.component)
-        if service is None:
+        if service is None or self._closed:
             return None
         if self._fsm is None or self._fsm.service is not service:
             self._fsm = FsmServant(service)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
+from weakref import WeakKeyDictionary, WeakSet
 
 from muros.findings import Finding
 from muros.rtc.codes import RtcError
@@ -42,23 +43,28 @@ class Objects:
         self._lock = threading.RLock()
         self._servants: dict[object, Any] = {}
         """By the model's object."""
+        self._references: WeakKeyDictionary[object, Any] = WeakKeyDictionary()
+        """Of these, and of those that were withdrawn: profiles of others may still name them."""
+        self._gone: WeakSet[object] = WeakSet()
+        """What was withdrawn: nobody becomes callable again by being mentioned."""
 
     # ---- from the model to references
 
     def offer(self, component: Component, key: str = "") -> Any:
         """Let others call `component`, by `corbaloc::HOST:PORT/KEY`, too. The reference, an RTC::RTObject."""
-        from muros.rtc.corba._component import ComponentServant
-
-        return self._reference(component, lambda: ComponentServant(component, self), key)
+        with self._lock:
+            self._gone.discard(component)
+            return self._offered(component, key)
 
     def withdraw(self, component: Component) -> None:
         """Take `component` away, with its ports, its contexts that have ended, its configuration and observers."""
         with self._lock:
-            servant: ComponentServant | None = self._servants.pop(component, None)
-            gone: list[Any] = [] if servant is None else [servant]
+            servant: ComponentServant | None = self._servants.get(component)
+            gone: list[Any] = []
             for model in tuple(self._servants):
-                if getattr(model, "owner", None) is component or getattr(model, "is_closed", False):
+                if component in (model, getattr(model, "owner", None)) or getattr(model, "is_closed", False):
                     gone.append(self._servants.pop(model))
+                    self._gone.add(model)
         if servant is not None:
             servant.close()
         for one in gone:
@@ -66,7 +72,7 @@ class Objects:
 
     def component(self, component: Component) -> Any:
         """The reference to a component of this process."""
-        return self.offer(component)
+        return self._offered(component)
 
     def port(self, port: PeerPort) -> Any:
         """The reference to a port, of this process or another. RtcError for what is neither."""
@@ -83,6 +89,7 @@ class Objects:
         """A port has been removed from its component: nobody can call it any more."""
         with self._lock:
             servant = self._servants.pop(port, None)
+            self._gone.add(port)
         if servant is not None:
             self.orb.deactivate(servant)
 
@@ -204,9 +211,17 @@ class Objects:
             raise RtcError(f"a {what} is named by a nil reference")
         return self.orb.servant_of(reference)
 
+    def _offered(self, component: Component, key: str = "") -> Any:
+        from muros.rtc.corba._component import ComponentServant
+
+        return self._reference(component, lambda: ComponentServant(component, self), key)
+
     def _reference(self, model: object, make: Callable[[], Any], key: str = "") -> Any:
         with self._lock:
+            if model in self._gone and model in self._references:
+                return self._references[model]
             servant = self._servants.get(model)
             if servant is None:
                 servant = self._servants[model] = make()
-        return self.orb.activate(servant, key)
+                self._references[model] = self.orb.activate(servant, key)
+            return self._references[model]

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 __all__ = ["Observers"]
 
+MAX_OBSERVERS: Final = 100
+"""Observers of one component: each has a thread."""
+
 _INTERFACES: Final = {
     Dialect.OPENRTM: (OpenRTM.ComponentObserver, OpenRTM.StatusKind),
     Dialect.RTC: (RTC.ComponentObserver, RTC.StatusKind),
@@ -43,18 +46,19 @@ class Observers:
         """Tell an observer from now on; one of the same id is replaced.
 
         False for what is no observer, does not answer, is not enabled (`sdo.service.consumer.enabled_services`), or
-        asks for what cannot be.
+        asks for what cannot be; and beyond MAX_OBSERVERS.
         """
         observer = self._made(profile)
         if observer is None:
             return False
         with self._lock:
             before = self._observers.pop(profile.id, None)
-            if not self._closed:
+            refused = self._closed or len(self._observers) >= MAX_OBSERVERS
+            if not refused:
                 self._observers[profile.id] = observer
         if before is not None:
             before.close()
-        if self._closed:
+        if refused:
             observer.close()
             return False
         watch(self._component, observer)
