@@ -9,8 +9,9 @@
         manager.wait()
 """
 
+from muros.rtc.manager._components import CreateError, ManagerEvent
 from muros.rtc.manager._factories import Factory, LimitError
-from muros.rtc.manager._manager import CreateError, Manager, ManagerEvent
+from muros.rtc.manager._manager import Manager
 from muros.rtc.manager._modules import LoadedModule, ModuleError
 from muros.rtc.manager._requests import RequestError
 from muros.rtc.manager._serve import serve, serve_files, serve_manager

@@ -7,15 +7,18 @@ the file named by `<category>.<type>.config_file` and then `<category>.<type>.*`
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from itertools import count
 from pathlib import Path
+from types import MappingProxyType
 from typing import Final
 
 from muros.rtc.codes import RtcError
-from muros.rtc.properties import Properties, read_conf_file
+from muros.rtc.formats import Fields, expand
+from muros.rtc.properties import Properties, read_conf_file, split_list
 
-__all__ = ["POLICIES", "inherited", "instance_properties", "numbered_names"]
+__all__ = ["POLICIES", "binding_names", "fields_of", "instance_properties", "numbered_names"]
 
 POLICIES: Final = ("process_unique", "node_unique", "ns_unique")
 """Values of `manager.components.naming_policy`: how far a number is looked for that nobody has."""
@@ -28,11 +31,6 @@ INHERITED: Final = (
     "logger.log_level", "naming.enable", "naming.type", "naming.formats", "sdo.", "port.", "manager.instance_name",
 )  # fmt: skip
 """Keys of the manager, or beginnings of such, that its components have as well."""
-
-
-def inherited(settings: Mapping[str, str]) -> dict[str, str]:
-    """What a component has of its manager's settings."""
-    return {key: text for key, text in settings.items() if key.startswith(INHERITED)}
 
 
 def instance_properties(
@@ -76,3 +74,27 @@ def numbered_names(type_name: str) -> Iterator[str]:
                 f"{type_name}0 to {type_name}{number - 1} are all taken; name the instance yourself"
             )
         yield f"{type_name}{number}"
+
+
+def binding_names(name: str, properties: Mapping[str, str], settings: Mapping[str, str]) -> tuple[str, ...]:
+    """The names in the naming service that an instance gets, after `naming.formats`."""
+    forms = properties.get("naming.formats") or settings["naming.formats"]
+    quoted = {key: text.replace("\\", "\\\\").replace("/", "\\/") for key, text in properties.items()}
+    fields = fields_of(settings, name.replace("\\", "\\\\").replace("/", "\\/"), quoted)
+    return tuple(dict.fromkeys(expand(form, fields, os.environ) for form in split_list(forms)))
+
+
+def fields_of(
+    settings: Mapping[str, str], name: str = "", properties: Mapping[str, str] = MappingProxyType({})
+) -> Fields:
+    """What the letters of formats stand for: of an instance, or without one of the manager."""
+    return Fields(
+        name or settings["manager.instance_name"],
+        properties.get("type_name", "manager"),
+        properties.get("version", ""),
+        properties.get("vendor", ""),
+        properties.get("category", ""),
+        settings.get("os.hostname", ""),
+        settings["manager.name"],
+        str(os.getpid()),
+    )

@@ -13,25 +13,23 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Mapping
-from enum import Enum
 from pathlib import Path
 from typing import Final
 
 from muros.findings import Severity
-from muros.rtc.actions import ComponentEvent
 from muros.rtc.codes import ReturnCode, RtcError
 from muros.rtc.component import Component
 from muros.rtc.composite import PeriodicECSharedComposite
-from muros.rtc.formats import Fields, expand
+from muros.rtc.formats import expand
 from muros.rtc.listeners import Listeners
 from muros.rtc.manager._colleagues import Colleagues
+from muros.rtc.manager._components import Components, CreateError, ManagerEvent
 from muros.rtc.manager._defaults import DEFAULTS
 from muros.rtc.manager._factories import Factories, Factory
-from muros.rtc.manager._instances import POLICIES, instance_properties, numbered_names
+from muros.rtc.manager._instances import POLICIES, fields_of
 from muros.rtc.manager._logger import Log
 from muros.rtc.manager._modules import LoadedModule, ModuleError, Modules
 from muros.rtc.manager._requests import (
-    ComponentId,
     CreateRequest,
     parse_connect_untrusted,
     parse_create_untrusted,
@@ -41,32 +39,16 @@ from muros.rtc.manager._timer import Timer
 from muros.rtc.manager._world import World
 from muros.rtc.ports import Port
 from muros.rtc.profiles import ConnectorProfile, Reference
-from muros.rtc.properties import ConfError, Properties, split_list
+from muros.rtc.properties import ConfError, Properties
 from muros.rtc.reports import Reporter
 
-__all__ = ["CreateError", "Manager", "ManagerEvent"]
+__all__ = ["Manager"]
 
 LEAST_WAIT: Final = 1.0
 """Seconds that a component's end may take at least; `manager.termination_waittime` may allow more."""
 
 CONNECT_AGAIN: Final = 1.0
 """Seconds after which a connection of `preconnect` is tried again while one of its components is missing."""
-
-
-class CreateError(RtcError):
-    """A component cannot be made; the text says why."""
-
-
-class ManagerEvent(Enum):
-    """What listeners of a manager hear of, with what they are called with."""
-
-    MODULE_LOADED = "MODULE_LOADED"  # the LoadedModule
-    MODULE_UNLOADED = "MODULE_UNLOADED"  # the LoadedModule
-    COMPONENT_CREATED = "COMPONENT_CREATED"  # the component
-    COMPONENT_ENDED = "COMPONENT_ENDED"  # the component
-    NAMES_BOUND = "NAMES_BOUND"  # the component, its names
-    NAMES_UNBOUND = "NAMES_UNBOUND"  # the component, its names
-    SHUTDOWN = "SHUTDOWN"  # nothing
 
 
 class Manager:
@@ -97,19 +79,16 @@ class Manager:
                 f"manager.components.naming_policy: there is no {self.settings['manager.components.naming_policy']!r};"
                 f" there are {', '.join(POLICIES)}"
             )
-        self.log: Final = Log(self.settings.node("logger"), self._fields())
+        self.log: Final = Log(self.settings.node("logger"), fields_of(self.settings))
         self._end_log = self.reporter.on_finding(self.log.finding)
         self._make_world = world
         self._world: World | None = None
         self._colleagues: Colleagues | None = None
-        self._components: dict[str, Component] = {}
+        self._components: Final = Components(self, self._component_ended)
         self._modules_of: dict[Path, list[Factory]] = {}
         self._loading: Path | None = None
-        self._names: dict[str, tuple[str, ...]] = {}
-        self._references: dict[str, Reference] = {}
         self._lock = threading.RLock()
         self._load_lock = threading.RLock()  # as Python's own lock for imports, held while modules run
-        self._made = 0
         self._ending = threading.Event()
         self._closed = False
         self.register(
@@ -305,8 +284,7 @@ class Manager:
     @property
     def components(self) -> tuple[Component, ...]:
         """Those that live, in the order of creation."""
-        with self._lock:
-            return tuple(self._components.values())
+        return self._components.all
 
     def component(self, name: str) -> Component | None:
         """The component of an instance name."""
@@ -324,11 +302,11 @@ class Manager:
 
     def reference_of(self, component: Component) -> Reference:
         """How others call a component."""
-        return self._references[component.instance_name]
+        return self._components.reference_of(component)
 
     def names_of(self, component: Component) -> tuple[str, ...]:
         """A component's names in the naming service."""
-        return self._names.get(component.instance_name, ())
+        return self._components.names_of(component)
 
     def create(self, request: str) -> Component | Reference:
         """A component after a request such as `Foo?instance_name=Left`: of this process, or of another manager's.
@@ -355,20 +333,7 @@ class Manager:
             request = parse_create_untrusted(request)
         if self.is_ending:
             raise CreateError(f"{request.id}: the manager is ending")
-        asked_name = request.properties.get("instance_name", "")
-        standing = self.component(asked_name) if asked_name else None
-        if standing is not None:
-            return standing
-        factory = self._factory(request.id)
-        name = self._reserve(factory, request)
-        try:
-            component = self._make(factory, name, request)
-        except BaseException:
-            self._names.pop(name, None)
-            self.factories.release(name)
-            raise
-        self._welcome(component)
-        return component
+        return self._components.create(request)
 
     def delete_component(self, name: str) -> ReturnCode:
         """End a component, one's own or a slave's. BAD_PARAMETER where there is none."""
@@ -382,9 +347,7 @@ class Manager:
         component = self.component(name)
         if component is None:
             if "://" not in name:
-                raise RtcError(
-                    f"there is no component {name}; there are {', '.join(self._components) or 'none'}"
-                )
+                raise self._no_component(name)
             self.world.activate_at(name)
             return
         for context in component.owned_contexts:
@@ -415,106 +378,14 @@ class Manager:
             raise RtcError(f"{connection} cannot be connected: {code.name}")
 
     def _no_component(self, name: str) -> RtcError:
-        return RtcError(f"there is no component {name}; there are {', '.join(self._components) or 'none'}")
+        known = ", ".join(component.instance_name for component in self.components) or "none"
+        return RtcError(f"there is no component {name}; there are {known}")
 
-    # How a component is made, and what follows its end
+    # Its end
 
-    def _factory(self, wanted: ComponentId) -> Factory:
-        factory = self.factories.find(wanted)
-        if factory is None and self.settings.flag("manager.modules.search_auto"):
-            path = self.modules.search(wanted.fits)
-            if path is not None:
-                self.load_module(str(path))
-                factory = self.factories.find(wanted)
-        if factory is None:
-            known = ", ".join(factory.name for factory in self.factories.all) or "none"
-            raise CreateError(
-                f"no component {wanted} is known; loaded: {known}. Load its module (manager.modules.preload), or put "
-                "it where manager.modules.load_path leads"
-            )
-        return factory
-
-    def _reserve(self, factory: Factory, request: CreateRequest) -> str:
-        """An instance name that nobody has as far as the naming policy looks."""
-        asked = request.properties.get("instance_name", "")
-        if asked:
-            if not self.factories.reserve(asked, factory):
-                raise CreateError(f"{asked} is being made or ended at this moment; try again")
-            return asked
-        policy = self.settings["manager.components.naming_policy"]
-        taken = set[str]()
-        if policy != "process_unique":
-            taken |= self.colleagues.instance_names()
-        if policy == "ns_unique":
-            taken |= self.world.instance_names()
-        for name in numbered_names(factory.properties.get("type_name") or factory.name):
-            if name in taken or not self.factories.reserve(name, factory):
-                continue
-            names = self._binding_names(name, factory.properties, request.properties)
-            if all(map(self.world.is_free, names)):
-                return name
-            self.factories.release(name)
-            if not any(name in bound for bound in names):  # no number makes a difference
-                self.factories.reserve(name, factory)
-                return name
-        raise AssertionError("numbered_names never ends without an error")
-
-    def _make(self, factory: Factory, name: str, request: CreateRequest) -> Component:
-        try:
-            component = factory.create(self)
-        except Exception as error:
-            self.reporter.failed("create-failed", name, f"{name} could not be constructed", error)
-            raise CreateError(f"{name}: making it raised {type(error).__name__}: {error}") from error
-        properties = instance_properties(
-            factory.properties, name, self.settings, request.properties, find_file=self._find_file
-        )
-        names = self._binding_names(name, properties, {})
-        properties["naming.names"] = ",".join(names)
-        self._names[name] = names
-        component.listeners.add(ComponentEvent.FINALIZED, lambda: self._component_ended(component))
-        component.configure(name, properties, self.reporter)
-        try:
-            code = component.initialize()
-        except RtcError as error:
-            component.exit()
-            raise CreateError(f"{name} cannot be made: {error}") from error
-        if code is not ReturnCode.RTC_OK:
-            raise CreateError(f"{name}: on_initialize answered {code.name}; its log says why")
-        return component
-
-    def _welcome(self, component: Component) -> None:
-        name, names = component.instance_name, self._names[component.instance_name]
-        key = f"{component.properties.get('category', '')}.{name}"
-        reference = self.world.offer_component(component, key)
-        with self._lock:
-            self._components[name] = component
-            self._references[name] = reference
-            self._made += 1
-        if self.settings.flag("naming.enable"):
-            self.world.bind(names, reference)
-            self.listeners.tell(ManagerEvent.NAMES_BOUND, component, names)
-        self.log.logger.info("component %s is there as %s", name, ", ".join(names))
-        self.listeners.tell(ManagerEvent.COMPONENT_CREATED, component)
-
-    def _component_ended(self, component: Component) -> None:
-        name = component.instance_name
-        with self._lock:
-            if self._components.pop(name, None) is None:
-                return
-            self._references.pop(name, None)
-            names = self._names.pop(name, ())
-        self.world.unbind(names)
-        self.listeners.tell(ManagerEvent.NAMES_UNBOUND, component, names)
-        self.world.withdraw_component(component)
-        factory = self.factories.release(name)
-        if factory is not None and factory.delete is not None:
-            try:
-                factory.delete(component)
-            except Exception as error:
-                self.reporter.failed("delete-failed", name, f"the delete function of {name} raised", error)
-        self.log.logger.info("component %s has ended", name)
-        self.listeners.tell(ManagerEvent.COMPONENT_ENDED, component)
-        if self._components or self.is_ending:
+    def _component_ended(self) -> None:
+        """The last one may be the end of the manager, too."""
+        if self.components or self.is_ending:
             return
         if self.settings.flag("manager.shutdown_on_nortcs") and not self.is_master:
             self.shutdown()
@@ -540,44 +411,15 @@ class Manager:
                     remedy="Let actions return soon: what takes long belongs into a thread of the component's own",
                     severity=Severity.ERROR,
                 )
-                self._component_ended(component)
+                self._components.forget(component)
 
     # Small things
 
-    def _fields(self, name: str = "", properties: Mapping[str, str] | None = None) -> Fields:
-        properties = properties or {}
-        return Fields(
-            name or self.settings["manager.instance_name"],
-            properties.get("type_name", "manager"),
-            properties.get("version", ""),
-            properties.get("vendor", ""),
-            properties.get("category", ""),
-            self.settings.get("os.hostname", ""),
-            self.settings["manager.name"],
-            str(os.getpid()),
-        )
-
     def _expand(self, form: str) -> str:
-        return expand(form, self._fields(), os.environ)
-
-    def _binding_names(
-        self, name: str, properties: Mapping[str, str], asked: Mapping[str, str]
-    ) -> tuple[str, ...]:
-        forms = (
-            asked.get("naming.formats") or properties.get("naming.formats") or self.settings["naming.formats"]
-        )
-        quoted = {key: text.replace("\\", "\\\\").replace("/", "\\/") for key, text in properties.items()}
-        fields = self._fields(name.replace("\\", "\\\\").replace("/", "\\/"), quoted)
-        return tuple(dict.fromkeys(expand(form, fields, os.environ) for form in split_list(forms)))
+        return expand(form, fields_of(self.settings), os.environ)
 
     def _names_of_manager(self) -> tuple[str, ...]:
         return tuple(map(self._expand, self.settings.words("manager.naming_formats")))
-
-    def _find_file(self, name: str) -> Path:
-        """A component's file: as it is named, or beside the manager's."""
-        path = self.folder / name
-        beside = Path(self.settings.get("config_file", "")).parent / name
-        return beside if not path.is_file() and beside.is_file() else path
 
     def _bind_to_processors(self) -> None:
         words = self.settings.words("manager.cpu_affinity")
@@ -598,10 +440,11 @@ class Manager:
 
     def _shut_down_when_empty(self) -> None:
         """End if nothing has been made when the time is over."""
-        duration, made = self.settings.number("manager.auto_shutdown_duration", 20.0), self._made
+        duration = self.settings.number("manager.auto_shutdown_duration", 20.0)
+        made = self._components.made
 
         def look() -> None:
-            if not self._components and self._made == made:
+            if not self.components and self._components.made == made:
                 self.log.logger.info("no component for %g s: the manager ends", duration)
                 self.shutdown()
 
