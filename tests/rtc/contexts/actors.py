@@ -1,6 +1,8 @@
 """Components of the tests: they answer as told, and remember what they were called for."""
 
+import threading
 from collections.abc import Callable, Collection, Mapping
+from itertools import count
 
 from muros.rtc.codes import PeerLostError, ReturnCode
 from muros.rtc.contexts import ExecutionContext
@@ -31,6 +33,7 @@ class Actor:
         self.during: dict[str, Callable[[], object]] = {}
         self.attached: dict[int, ExecutionContext] = {}
         self.lost = False
+        self._lock = threading.Lock()
 
     @property
     def trace(self) -> list[str]:
@@ -41,8 +44,9 @@ class Actor:
 
     def attach_context(self, context: ExecutionContext) -> int:
         self._check()
-        handle = 1000 + len(self.attached)
-        self.attached[handle] = context
+        with self._lock:
+            handle = next(number for number in count(1000) if number not in self.attached)
+            self.attached[handle] = context
         return handle
 
     def detach_context(self, handle: int) -> ReturnCode:

@@ -370,6 +370,38 @@ def test_components_come_and_go(stage: Stage) -> None:
     assert {handle for _, handle in guest.calls} == {1000}
 
 
+def test_a_component_that_is_added_twice_from_inside_joins_once(stage: Stage) -> None:
+    owner, guest = Actor("owner"), Actor("guest")
+    context = stage.make(PeriodicExecutionContext, owner)
+    answers: list[ReturnCode] = []
+    owner.during["onActivated"] = lambda: answers.extend(context.add_component(guest) for _ in range(2))
+    assert context.activate_component(owner) is OK
+    assert context.deactivate_component(owner) is OK
+    assert answers == [OK, OK]  # neither has been done when it answers
+    assert context.participants == (guest,)
+    assert guest.attached == {1000: context}
+
+
+def test_starting_and_stopping_from_many_threads_is_told_in_turn(stage: Stage) -> None:
+    actor = Actor()
+    context = stage.make(PeriodicExecutionContext, actor)
+
+    def switch() -> None:
+        for _ in range(100):
+            context.stop()
+            context.start()
+
+    threads = [threading.Thread(target=switch) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(SOON)
+    context.stop()
+    calls = [name for name, _ in actor.calls]
+    assert calls == ["onStartup", "onShutdown"] * (len(calls) // 2)
+    assert len(calls) >= 4
+
+
 def test_a_guest_lets_go_when_the_context_ends(stage: Stage) -> None:
     owner, guest = Actor("owner"), Actor("guest")
     context = stage.make(PeriodicExecutionContext, owner, guest)

@@ -202,6 +202,15 @@ def test_who_goes_is_deactivated_and_shut_down() -> None:
     assert actor.trace == ["onActivated", "onDeactivated", "onShutdown"]
 
 
+def test_who_is_here_is_not_admitted_again() -> None:
+    actor = Actor()
+    stage = Stage(actor)
+    handle = actor.attach_context(None)  # type: ignore[arg-type]
+    assert not stage.cycle.admit(Member(actor, handle))
+    assert actor.attached == {}
+    assert len(stage.cycle.members) == 1
+
+
 def test_observers_are_told_of_changes_once_each() -> None:
     actor = Actor(returns={"onActivated": "RTC_ERROR"})
     stage = Stage(actor)

@@ -42,10 +42,12 @@ class Judge(Actor):
         self.faults = faults
         self.busy = threading.Lock()
         self.state = "INACTIVE"
+        self.handle = -1
         self.inside: Callable[[], object] = lambda: None
 
     def detach_context(self, handle: int) -> ReturnCode:
-        self.state = "INACTIVE"  # one who comes again begins anew, also from Error
+        if handle == self.handle:
+            self.state = "INACTIVE"  # one who comes again begins anew, also from Error
         return super().detach_context(handle)
 
     def _do(self, name: str, handle: int) -> ReturnCode:
@@ -53,6 +55,7 @@ class Judge(Actor):
             self.faults.append(f"{self.instance_name}: {name} while it is in another callback")
             return ReturnCode.RTC_OK
         try:
+            self.handle = handle
             if name not in FOLLOWS[self.state]:
                 self.faults.append(f"{self.instance_name}: {name} in {self.state}")
             self.inside()

@@ -69,8 +69,8 @@ class ExecutionContext:
         self._cycle: Final = Cycle(self._tell, self._report, name=lambda: str(self))
         self._owner: Participant | None = None
         self._owned: tuple[Member, ...] = ()
-        self._joining: tuple[Participant, ...] = ()
         self._running = False
+        self._started = False  # what the components were told last; only the conductor changes it
         self._closed = False
         self._collapsed = 0
         self._observers: dict[object, Callable[[ContextEvent], object]] = {}
@@ -150,11 +150,7 @@ class ExecutionContext:
                 return _NO
             self._running = True
 
-        def work() -> ReturnCode:
-            self._cycle.startup()
-            return _OK
-
-        return self._ask(Request("start", work))
+        return self._ask(Request("start", self._tell_running))
 
     def stop(self) -> ReturnCode:
         """Stand still: no pass begins from now on, on_shutdown of all; the states of components stay."""
@@ -163,12 +159,7 @@ class ExecutionContext:
                 return _NO
             self._running = False
 
-        def work() -> ReturnCode:
-            self._schedule.stop()
-            self._cycle.shutdown()
-            return _OK
-
-        return self._ask(Request("stop", work))
+        return self._ask(Request("stop", self._tell_running))
 
     def set_rate(self, rate: float) -> ReturnCode:
         """Another rate, from the next pass on; on_rate_changed of all.
@@ -193,16 +184,13 @@ class ExecutionContext:
         with self._changed:
             if self._closed:
                 return
-            running, self._running, self._closed = self._running, False, True
+            self._running, self._closed = False, True
 
         def work() -> ReturnCode:
-            self._schedule.stop()
-            members = self._cycle.members
-            for member in members:
+            for member in self._cycle.members:
                 self._cycle.ask(member, Ask.DEACTIVATE)
-            if running:
-                self._cycle.shutdown()
-            for member in members:
+            self._tell_running()
+            for member in self._cycle.members:
                 self._cycle.dismiss(member, running=False)
             return _OK
 
@@ -218,14 +206,11 @@ class ExecutionContext:
         """
         member = Member(component, handle, owner=True)
 
-        def work() -> ReturnCode:
-            return self._admit(member)
-
         with self._changed:
             if self._owner is None:
                 self._owner = component
             self._owned = (*self._owned, member)
-        self._ask(Request("taking its owner in", work))
+        self._ask(Request("taking its owner in", lambda: self._admit(member)))
 
     def unbind_owner(self, component: Participant) -> None:
         """`component` ends: it is let go, with on_shutdown; the last of the owners closes the context."""
@@ -245,23 +230,15 @@ class ExecutionContext:
 
         PRECONDITION_NOT_MET: it is here; RTC_ERROR: its process does not answer.
         """
-        with self._changed:
-            if self._closed or self._cycle.find(component) or component in self._joining:
-                return _NO
-            self._joining = (*self._joining, component)
+        if self._closed or self._cycle.find(component):
+            return _NO
         try:
-            handle = component.attach_context(self)
+            member = Member(component, component.attach_context(self))
         except Exception as error:
-            self._joined(component)
             why = str(error) if isinstance(error, PeerLostError) else f"{type(error).__name__}: {error}"
             self._note("rtc-member-lost", f"{name_of(component)} cannot be added", why)
             return ReturnCode.RTC_ERROR
-
-        def work() -> ReturnCode:
-            self._joined(component)
-            return self._admit(Member(component, handle))
-
-        return self._ask(Request("taking a component in", work))
+        return self._ask(Request("taking a component in", lambda: self._admit(member)))
 
     def remove_component(self, component: Participant) -> ReturnCode:
         """Let a component go: on_deactivated if it is active, on_shutdown if the context runs."""
@@ -381,19 +358,27 @@ class ExecutionContext:
         )
         return request.code if request.is_finished else ReturnCode.RTC_ERROR
 
-    def _joined(self, component: Participant) -> None:
-        with self._changed:
-            self._joining = tuple(other for other in self._joining if other is not component)
+    def _tell_running(self) -> ReturnCode:
+        """Let the components know whether the context runs, if that has changed; for the conductor."""
+        if self._started is not self._running:
+            self._started = not self._started
+            if self._started:
+                self._cycle.startup()
+            else:
+                self._schedule.stop()
+                self._cycle.shutdown()
+        return _OK
 
     def _admit(self, member: Member) -> ReturnCode:
-        self._cycle.admit(member)
-        if self._running:
+        if not self._cycle.admit(member):
+            return _NO
+        if self._started:
             self._cycle.startup((member,))
         return _OK
 
     def _removal(self, member: Member) -> Request:
         def work() -> ReturnCode:
-            self._cycle.dismiss(member, running=self._running)
+            self._cycle.dismiss(member, running=self._started)
             return _OK
 
         return Request("letting a component go", work)

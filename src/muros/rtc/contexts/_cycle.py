@@ -118,10 +118,15 @@ class Cycle:
         self._tell(ContextEvent(ContextEventKind.RATE_CHANGED))
         return result
 
-    def admit(self, member: Member) -> None:
-        """A component joins, inactive."""
+    def admit(self, member: Member) -> bool:
+        """A component joins, inactive. False where it is here already: it is told to forget this handle."""
+        if self.find(member.participant) is not None:
+            if not member.owner:
+                self._call(member, "detach_context")
+            return False
         self.members = (*self.members, member)
         self._tell(ContextEvent(ContextEventKind.ADMITTED, member.participant, member.handle))
+        return True
 
     def dismiss(self, member: Member, *, running: bool) -> None:
         """A component goes, as one that is deactivated and whose context stops. Nothing where it has gone already."""
