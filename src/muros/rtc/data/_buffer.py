@@ -101,7 +101,7 @@ class Buffer(Generic[T]):
             left = None if deadline is None else deadline - self._clock()
             if left is not None and left <= 0:
                 return BufferStatus.TIMEOUT
-            self.condition.wait(left)
+            self.condition.wait(None if left is None else min(left, threading.TIMEOUT_MAX))
         return BufferStatus.OK
 
     def close(self) -> None:

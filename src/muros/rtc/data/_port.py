@@ -42,8 +42,8 @@ FAN_LIMIT: Final = 100
 class DataPort(Port, Generic[T]):
     """A port that values of one data type go through.
 
-    `properties` go into its profile, `report` takes findings. `clock` (seconds, monotonic) is what time-outs are measured
-    by, `wall` (ns since the epoch) what `timestamp_policy` sets.
+    `properties` go into its profile, `report` takes findings. Time-outs are measured by `clock` (seconds, monotonic),
+    `timestamp_policy` sets `wall` (ns since the epoch).
     """
 
     side: ClassVar[Side]

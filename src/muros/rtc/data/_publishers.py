@@ -175,7 +175,7 @@ class _Threaded:
             deadline = max(deadline + period, now - (now - deadline) % period)
             with self._wake:
                 while not self._closed and (left := deadline - self._clock()) > 0:
-                    self._wake.wait(left)
+                    self._wake.wait(min(left, threading.TIMEOUT_MAX))
 
     def _pass(self) -> DataPortStatus | None:
         """Send what the policy selects; what came of the last one, None if there was nothing."""
