@@ -19,12 +19,12 @@ def test_logs_are_seen(distro: str, domain: Domain, monkeypatch: pytest.MonkeyPa
     log = camera.logger(level="debug", show=shown.append)
     again = camera.timer(0.1, lambda: log.info("again"), autostart=False)
     assert log.warn("early")
-    program.thread.start()
+    program.start()
     try:
         with start(distro, discovery="localhost") as ros:
             node = ros.do("node", name="reader", domain=int(domain))
             heard = _subscription(ros, node)
-            ros.do("matched", thing=heard)
+            assert ros.do("matched", thing=heard, count=2) == 2, "its own node logs there, too"
             assert log.debug("late")
             told = ros.do("take", subscription=heard, count=2)
             assert [(m["level"], m["name"], m["msg"]) for m in told] == [
