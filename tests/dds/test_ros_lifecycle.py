@@ -49,7 +49,7 @@ def test_ros_moves_a_node_of_ours(ros: Peer, domain: Domain) -> None:
         on_deactivate=lambda: False,
         on_shutdown=lambda: called.append("shutdown"),
     )
-    program.thread.start()
+    program.start()
     try:
         node = ros.do("node", name="mover", domain=int(domain))
         events = ros.do(

@@ -1,15 +1,15 @@
 """What a node sees of others, over every way: names, types, counts, endpoints, waiting, and being told of changes."""
 
-import threading
-from typing import Any
+from collections.abc import Iterator
 
 import pytest
 
-from muros.rclc import Context, Executor, Node
+from muros.rclc import Context, Node
 from muros.rclc.host.graph import CLIENT, NO_GRAPH, PUBLISHER, SERVER, SUBSCRIPTION
 from muros.space import open_space
 from tests.client.world import World
 from tests.rclc.test_rclc import two
+from tests.rclc_space.spun import Spun
 from tests.rclc_space.ways import PATIENCE, Stage
 
 from example_interfaces.srv import AddTwoInts
@@ -136,41 +136,22 @@ def test_a_node_leaves_nothing_of_its_graph(stage: Stage) -> None:
     stage.until(lambda: company.arm.graph.nodes() == ["/lab/arm", "/leg"])
 
 
-class Beside:
-    """Somebody whose context a thread of its own spins, who does things when told."""
+class Beside(Spun):
+    """Somebody beside the test, who makes things when told."""
 
-    def __init__(self, stage: Stage, name: str) -> None:
-        self.context: Context = stage.way.open()
-        self.node: Node = self.context.node(name)
-        self._wanted: list[Any] = []
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._spin, daemon=True)
-        self._thread.start()
-
-    def do(self, call: Any) -> None:
-        """Has the thread do something, soon."""
-        self._wanted.append(call)
-
-    def close(self) -> None:
-        """Ends it."""
-        self._over.set()
-        self._thread.join(PATIENCE)
-        self.context.close()
-
-    def _spin(self) -> None:
-        executor = Executor(self.context)
-        while not self._over.is_set():
-            executor.spin_some(0.01)
-            while self._wanted:
-                self._wanted.pop(0)()
+    def __init__(self, stage: Stage) -> None:
+        super().__init__(stage.way.open())
+        self.node: Node = self.context.node("beside")
+        self.start()
 
 
 @pytest.fixture
-def beside(stage: Stage) -> Any:
+def beside(stage: Stage) -> Iterator[Beside]:
     """Somebody beside the test."""
-    made = Beside(stage, "beside")
+    made = Beside(stage)
     yield made
     made.close()
+    assert made.raised == []
 
 
 def test_waiting_for_a_service(stage: Stage, beside: Beside) -> None:

@@ -4,7 +4,6 @@ P1 to P15 are what the C library's own suite expects; `tests/vectors/rmw/paramet
 """
 
 import json
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -34,6 +33,7 @@ from muros.rclc.parameter_errors import (
     ParameterMemoryError,
     ParameterTimeoutError,
 )
+from tests.rclc_space.spun import Spun
 from tests.rclc_space.ways import PATIENCE, Stage
 
 VECTORS: dict[str, Any] = json.loads((Path(__file__).parents[1] / "vectors/rmw/parameters.json").read_text())
@@ -49,23 +49,20 @@ class Pair:
 
     def __init__(self, stage: Stage, **options: Any) -> None:
         self.stage = stage
-        self.server: Context = stage.way.open()
+        self.server = Spun(stage.way.open())
         self.client: Context = stage.way.open()
-        self.node = self.server.node("server", "lab")
+        self.node = self.server.context.node("server", "lab")
         self.parameters: Parameters = self.node.parameters(**options)
         self.asker = self.client.node("asker")
         self.remote = ParameterClient(self.asker, "/lab/server", PATIENCE)
         self.events: list[Any] = []
         self.seen: Changes = []
         self.agrees = True
-        self._calls: list[Callable[[], object]] = []
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._spin, daemon=True)
 
     def start(self) -> None:
         """From now on the node answers, and the client hears its events."""
         self.remote.on_event(self.events.append)
-        self._thread.start()
+        self.server.start()
         assert self.remote.wait(PATIENCE)
 
     def declare_three(self) -> None:
@@ -82,12 +79,6 @@ class Pair:
 
         self.parameters.on_change(decide)
 
-    def local(self, call: Callable[[], object]) -> None:
-        """Has the node's own thread do something."""
-        done = threading.Event()
-        self._calls += [call, done.set]
-        assert done.wait(PATIENCE)
-
     def event(self) -> Any:
         """The next event that the client hears."""
         executor = Executor(self.client)
@@ -99,18 +90,8 @@ class Pair:
 
     def close(self) -> None:
         """Ends both."""
-        self._over.set()
-        if self._thread.is_alive():
-            self._thread.join(PATIENCE)
         self.client.close()
         self.server.close()
-
-    def _spin(self) -> None:
-        executor = Executor(self.server)
-        while not self._over.is_set():
-            executor.spin_some(0.01)
-            while self._calls:
-                self._calls.pop(0)()
 
 
 @pytest.fixture
@@ -532,7 +513,7 @@ def test_p13_events(pair: Callable[..., Pair], profile: dict[str, Any]) -> None:
     assert before - 1 < event.stamp.sec < time.time() + 1
     assert not event.new_parameters
     assert not event.deleted_parameters
-    both.local(lambda: both.parameters.declare("late", "text"))
+    both.server.do(lambda: both.parameters.declare("late", "text"))
     event = both.event()
     assert names(event.new_parameters) == ["late"]
     assert not event.changed_parameters
@@ -542,7 +523,7 @@ def test_p13_events(pair: Callable[..., Pair], profile: dict[str, Any]) -> None:
     assert names(event.deleted_parameters) == ["late"]
     assert not event.new_parameters
     assert not event.changed_parameters
-    both.local(lambda: both.parameters.undeclare("flag"))
+    both.server.do(lambda: both.parameters.undeclare("flag"))
     assert names(both.event().deleted_parameters) == ["flag"]
     with pytest.raises(ParameterRejectedError):
         both.remote.set("count", 1.0)
@@ -599,7 +580,7 @@ def test_every_type(pair: Callable[..., Pair], tmp_path: Path) -> None:
     assert text.startswith("/lab/server:\n  ros__parameters:\n    b: true\n")
     assert "    motor:\n      current: 3\n" in text
     both.remote.update({name: value for name, value in changed.items() if value != []})
-    both.local(lambda: both.parameters.set("bs", []))
+    both.server.do(lambda: both.parameters.set("bs", []))
     assert both.remote.get(list(changed)) == changed
     second = tmp_path / "changed.yaml"
     both.remote.dump(second)
@@ -645,27 +626,17 @@ def test_list_with_prefixes_and_depth(pair: Callable[..., Pair]) -> None:
 def test_a_callback_that_raises_is_answered(pair: Callable[..., Pair]) -> None:
     both = pair()
     both.declare_three()
-    stopped: list[Exception] = []
 
     def fail(old: Parameter | None, new: Parameter | None) -> bool:
         raise ValueError("no")
 
     both.parameters.on_change(fail)
-    spin = both._spin
-
-    def catching() -> None:
-        for _ in range(3):
-            try:
-                spin()
-            except ValueError as error:
-                stopped.append(error)
-
-    both._thread = threading.Thread(target=catching, daemon=True)
     both.start()
     assert refusal(lambda: both.remote.set("count", 3)) == REASONS["internal failure"]
     assert refusal(lambda: both.remote.update({"count": 3})) == REASONS["internal failure"]
     assert both.remote.get("count") == 0
-    assert [str(error) for error in stopped] == ["no", "no"]
+    both.server.do(lambda: None)
+    assert [str(error) for error in both.server.raised] == ["no", "no"]
 
 
 def test_within_an_executor(pair: Callable[..., Pair]) -> None:

@@ -1,14 +1,14 @@
 """A program straight in the graph and a node of ROS 2: topics, services and names, both ways."""
 
-import threading
 import time
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
-from muros.rclc import Context, Executor
+from muros.rclc import Context
 from tests.dds.peers import Peer
+from tests.rclc_space.spun import Spun
 from tests.rclc_space.ways import PATIENCE
 
 from std_msgs.msg import String
@@ -18,26 +18,11 @@ SWITCH = "std_srvs/srv/SetBool"
 STRING = "std_msgs/msg/String"
 
 
-class Program:
-    """A program of ours that a thread spins."""
+class Program(Spun):
+    """A program of ours, straight in the graph."""
 
     def __init__(self, url: str) -> None:
-        self.context = Context(url)
-        self.problems: list[str] = []
-        self.context.on_problem(lambda code, text: self.problems.append(text))
-        self.thread = threading.Thread(target=self._spin, daemon=True)
-        self.ended = threading.Event()
-
-    def _spin(self) -> None:
-        executor = Executor(self.context)
-        while not self.ended.is_set():
-            executor.spin_some(0.2)
-
-    def close(self) -> None:
-        """Ends it."""
-        self.ended.set()
-        self.thread.join(PATIENCE)
-        self.context.close()
+        super().__init__(Context(url))
 
 
 @pytest.fixture
@@ -68,7 +53,7 @@ def test_a_program_and_rclpy(program: Program, ros: Peer, dds_url: str) -> None:
         assert client.send(SetBool.Request(data=True), answers.append, timeout=PATIENCE)
 
     timer = node.timer(0.001, ask)
-    program.thread.start()
+    program.start()
 
     theirs = ros.do("node", name="ros", domain=int(dds_url.partition(":")[2]))
     ros.do(
