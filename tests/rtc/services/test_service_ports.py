@@ -20,6 +20,7 @@ from muros.rtc.services import (
     Provided,
     Required,
     ServicePort,
+    connect,
     service_objects,
     use_service_objects,
 )
@@ -206,6 +207,23 @@ def test_an_exact_match_goes_before_a_derived_one() -> None:
     derived.register_provider("myservice0", "BetterService", Echo(), BetterService)
     case.connect(derived, case.provider, case.consuming)
     assert case.consumer.object.offered.interface is MyService
+
+
+def test_programs_connect_ports() -> None:
+    case = Case()
+    profile = connect(case.provider, case.consuming, name="by hand")
+    assert (profile.name, case.consumer.is_connected) == ("by hand", True)
+    lonely = case.port("Lonely0")
+    lonely.register_consumer("nobody", "MyService", Consumer())
+    with pytest.raises(
+        RtcError, match=r"MyServiceProvider0\.MyService and Lonely0\.MyService are not connected: RTC_ERR"
+    ):
+        connect(case.provider, lonely)
+    assert connect(case.provider, lonely, strict=False).text("port.connection.strictness") == "best_effort"
+    key = "Lonely0.port.MyService.required.MyService.nobody"
+    assert connect(case.provider, lonely, properties={key: PROVIDED})
+    with pytest.raises(RtcError, match="needs the ports"):
+        connect()
 
 
 def test_its_profile_lists_its_interfaces() -> None:

@@ -1,5 +1,6 @@
 """Service ports: operations that one component offers and others call."""
 
+from muros.rtc.services._connect import connect
 from muros.rtc.services._objects import (
     NotConnectedError,
     OfferedObject,
@@ -21,6 +22,7 @@ __all__ = [
     "ServiceObjects",
     "ServicePort",
     "ServiceTypeError",
+    "connect",
     "service_objects",
     "use_service_objects",
 ]
