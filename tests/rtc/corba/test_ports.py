@@ -271,6 +271,25 @@ def test_the_life_of_a_component_is_led_from_outside(pair: Pair) -> None:
     assert not component.is_alive(context)
 
 
+def test_a_component_named_by_its_key_is_the_same(orb: Orb, pair: Pair) -> None:
+    """Whoever got it by corbaloc activates the component that the context knows."""
+    component = Source()
+    component.configure("Keyed0", {})
+    assert component.initialize() == 0
+    reference = pair.objects.offer(component, "Generic.Keyed0")
+    try:
+        octets = bytes.fromhex(orb.to_text(reference)[4:])
+        place = octets.index(b"127.0.0.1\0") + 10
+        port = int.from_bytes(octets[place : place + 2], "little")
+        by_key = orb.to_reference(f"corbaloc::127.0.0.1:{port}/Generic.Keyed0")._narrow(RTC.RTObject)
+        (context,) = by_key.get_owned_contexts()
+        assert context.activate_component(by_key) == RTC.RTC_OK
+        assert context.get_component_state(reference) == RTC.ACTIVE_STATE
+    finally:
+        component.exit()
+        pair.objects.withdraw(component)
+
+
 def test_a_triggered_context_is_ticked(orb: Orb) -> None:
     objects = set_up(orb)
     calls = queue.Queue[int]()

@@ -185,13 +185,15 @@ class Orb:
         return self.servant_of(reference) is not None
 
     def servant_of(self, reference: Any) -> Any | None:
-        """The servant behind `reference` if it is one of this process and active, else None."""
+        """The servant behind `reference`, made with its key or without, if it is of this process and active."""
         from omniORB import CORBA, PortableServer
 
-        try:
-            return self._poa.reference_to_servant(reference)
-        except (CORBA.Exception, PortableServer.POA.WrongAdapter, PortableServer.POA.ObjectNotActive):
-            return None
+        for poa in (self._poa, self._keyed):
+            try:
+                return poa.reference_to_servant(reference)
+            except (CORBA.Exception, PortableServer.POA.WrongAdapter, PortableServer.POA.ObjectNotActive):
+                continue
+        return None
 
     def to_text(self, reference: Any) -> str:
         """The reference as `IOR:...`."""
