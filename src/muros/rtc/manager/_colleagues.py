@@ -25,6 +25,9 @@ __all__ = ["Colleagues"]
 START_TIME: Final = 10.0
 """Seconds that a slave has to report to the master that started it."""
 
+OWN_KEYS: Final = ("manager.", "corba.", "os.", "config_file")
+"""Beginnings of the settings that a slave does not share with the master that starts it."""
+
 LOOK_TIME: Final = 0.2
 """Seconds between two looks at whether a slave that was started still runs."""
 
@@ -265,6 +268,6 @@ class Colleagues:
         if endpoints not in ("", "all"):
             passed["corba.endpoints"] = endpoints.rpartition(":")[0] + ":" if ":" in endpoints else endpoints
         for key in settings:
-            if key.startswith(("logger.", "naming.")):
+            if not key.startswith(OWN_KEYS):
                 passed.setdefault(key, settings[key])
         return [*words, *(word for key, text in passed.items() for word in ("-o", f"{key}:{text}"))]
