@@ -28,7 +28,9 @@ def test_every_measure_is_there(tmp_path: Path) -> None:
     )
     assert (done.returncode, done.stderr) == (0, "")
     rows = {(row["rate"], row["way"]): row["runs"] for row in json.loads(file.read_text())}
-    assert set(rows) == {(rate, way) for rate in (100, 1000) for way in ("bare", "ours", "catch up", "idle")}
+    assert set(rows) == {
+        (rate, way) for rate in (100, 1000) for way in ("bare", "ours", "catch up", "fifo", "idle")
+    }
     for (rate, way), (row,) in rows.items():
         assert row["reached"] == 0 if way == "idle" else 0 < row["reached"] <= 1.1 * rate
         assert 0 <= row["p50"] <= row["p99"] <= row["max"]
