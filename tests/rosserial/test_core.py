@@ -312,6 +312,24 @@ def test_logs_go_to_rosout() -> None:
     assert scene.said(BoardLog)[4].text() == "[FATAL] a: level 4"
 
 
+def test_a_boards_node_says_what_the_server_says_of_the_board() -> None:
+    """Where people grep: as the node of the ROS 1 servers did, in the log of the graph too."""
+    scene = Scene()
+    rosout = scene.reader("/rosout", "rcl_interfaces/msg/Log")
+    led_board(scene)
+    scene.core.boards[0].report("test", what="{n} thing{s}", why="so", remedy="Do it")
+    scene.step(2)
+    said = {message.msg: (message.level, message.name) for message in rosout()}
+    assert said["Note: subscribe buffer size is 512 bytes"] == (20, "board_a")
+    assert said["Setup subscriber on led_out [std_msgs/Byte]"] == (20, "board_a")
+    assert said["Setup publisher on chatter [std_msgs/String]"] == (20, "board_a")
+    assert any(
+        text.startswith("finding: board a: 1 thing: so")
+        for text, how in said.items()
+        if how == (30, "board_a")
+    )
+
+
 def test_a_restart_is_noticed_within_a_second_and_nobody_in_the_graph_sees_it() -> None:
     scene = Scene()
     board, led, chatter = led_board(scene)

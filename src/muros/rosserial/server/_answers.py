@@ -52,7 +52,7 @@ def parameter_answer(board: Board, name: str) -> bytes:
             why="it is not set",
             remedy=f"Set it: muros param set {board.node_name} {plain_name(name, board.node_name)} VALUE",
         )
-    room = board.input_buffer or board.core.limits.input_buffer
+    room = board.roster.input_buffer or board.core.limits.input_buffer
     body, fits = answer_of(value, room)
     if not fits:
         board.report(

@@ -29,11 +29,8 @@ from muros.rosserial.constants import (
     ID_PARAMETER_REQUEST,
     ID_PUBLISHER,
     ID_SERVICE_CLIENT,
-    ID_SERVICE_SERVER,
-    ID_SUBSCRIBER,
     ID_TIME,
     ID_TX_STOP,
-    OVERHEAD,
     VERSION_GROOVY,
     VERSION_HYDRO,
 )
@@ -74,7 +71,7 @@ from muros.rosserial.server.events import (
     BoardLost,
     BoardReady,
     BoardReset,
-    BufferKnown,
+    Event,
 )
 
 if TYPE_CHECKING:
@@ -130,9 +127,6 @@ class Board:
         self.output = Output(link, address, 0, core.limits.lead, core.limits.max_requests)
         self.node: Node | None = None
         self.roster = Roster(self)
-        self.input_buffer = 0
-        """The board's buffer for what it is sent; 0 until it was announced."""
-        self.output_buffer = 0
         self.came_at = 0
         """When its line came up."""
         self.heard_at = 0
@@ -188,12 +182,11 @@ class Board:
         self.decoder.version = ANY_VERSION
         self.decoder.limit = self.core.limits.max_payload
         self.version = 0
-        self.input_buffer = self.output_buffer = 0
         self.last_time = None
         self._open_asks.clear()
         self.came_at = self._first_ask = self.heard_at = self.connected_at = now
         self._told_ready = False
-        self.roster.restart()
+        self.roster.renew()
         self.suspicions.begin(now)
         self._ask(now)
         self._plan(now)
@@ -292,6 +285,12 @@ class Board:
         else:
             self._sent_at = now
             self.pump(now)
+
+    def tell(self, event: Event) -> None:
+        """Hands an event to whoever watches; its node says it, too."""
+        self.core.tell(event)
+        if self.node is not None:
+            self.node.log(event.severity, event.text())
 
     def report(self, code: str, *, what: str, why: str, remedy: str, subject: str = "", n: int = 1) -> None:
         """Counts a finding about it."""
@@ -417,7 +416,7 @@ class Board:
 
     def _heard_again(self, now: int) -> None:
         if self.lost_at is not None:
-            self.core.tell(BoardBack(self.label, (now - self.lost_at) / 1000))
+            self.tell(BoardBack(self.label, (now - self.lost_at) / 1000))
             self.lost_at = None
         self._told_lost = False
 
@@ -443,7 +442,7 @@ class Board:
             self.roster.remove(endpoint)
         if not self._told_ready and self.node is not None:
             self._told_ready = True
-            self.core.tell(
+            self.tell(
                 BoardReady(
                     self.label,
                     self.node_name,
@@ -466,7 +465,7 @@ class Board:
         if self.node is not None and self.lost_at is None:
             self._told_lost = True
             self.lost_at = now
-            self.core.tell(BoardLost(self.label, reason, self.core.limits.keep_lost / 1000))
+            self.tell(BoardLost(self.label, reason, self.core.limits.keep_lost / 1000))
 
     def _forget(self, now: int) -> None:
         """It was away too long: its endpoints go, and it too if its line is gone."""
@@ -514,7 +513,7 @@ class Board:
         self.decoder.version = heard
         if self.version != heard:
             self.version = heard
-            self.core.tell(BoardHeard(self.label, heard, self.baud))
+            self.tell(BoardHeard(self.label, heard, self.baud))
         return True
 
     def _protocol(self, topic_id: int, buf: Buffer, off: int, n: int, now: int) -> bool:
@@ -541,7 +540,7 @@ class Board:
         if early and self.state == SYNCED and not self._open_asks:
             self.resets += 1
             self.roster.restart()
-            self.core.tell(BoardReset(self.label))
+            self.tell(BoardReset(self.label))
             self._told_ready = False
             self._first_ask = now
             self._ask(now)
@@ -552,15 +551,6 @@ class Board:
         """The board names a topic, or one half of a service."""
         self._answered_topics(now)
         self.connected_at = now
-        if half in (ID_SUBSCRIBER, ID_SERVICE_SERVER + 1, ID_SERVICE_CLIENT + 1):
-            if not self.input_buffer:
-                self.core.tell(BufferKnown(self.label, "subscribe", info.buffer_size))
-            self.input_buffer = max(info.buffer_size, 0)
-        else:
-            if not self.output_buffer:
-                self.core.tell(BufferKnown(self.label, "publish", info.buffer_size))
-            self.output_buffer = max(self.output_buffer, info.buffer_size)
-            self.decoder.limit = min(self.core.limits.max_payload, max(self.output_buffer, OVERHEAD))
         self.roster.named(half, info)
         if self.roster.in_doubt and all(endpoint.confirmed for endpoint in self.roster.endpoints.values()):
             self._be_sure()

@@ -8,7 +8,7 @@ announces in between is given the time by ``clock``.
 from collections.abc import Callable, Hashable
 from typing import NamedTuple
 
-from muros.findings import Findings
+from muros.findings import Finding, Findings
 from muros.links.voice import Voice
 from muros.rosserial.server._board import Board
 from muros.rosserial.server._door import World
@@ -18,6 +18,9 @@ from muros.rosserial.server._status import status_of
 from muros.rosserial.server.events import BoardGone, Event, LineUp
 
 __all__ = ["Identity", "Port", "ServerCore"]
+
+
+_WARNING = 2
 
 
 class Identity(NamedTuple):
@@ -90,6 +93,7 @@ class ServerCore(Voice[Event]):
         self.boards: list[Board] = []
         self._diagnosed_at: int | None = None
         self._ports: list[Port] = []
+        self._unwatch = findings.on_finding(self._log)
 
     def attach(self, link: Link, identify: Callable[[Hashable], Identity]) -> Port:
         """A port for ``link``; ``identify(address)`` says who is there."""
@@ -127,6 +131,12 @@ class ServerCore(Voice[Event]):
         if self.limits.diagnostics and self._diagnosed_at is None:
             self._diagnosed_at = now + self.limits.diagnostics
             self.wake(self._diagnosed_at)
+
+    def close(self, reason: str) -> None:
+        """Forgets all boards, for good."""
+        for board in list(self.boards):
+            self.remove(board, reason)
+        self._unwatch()
 
     def moves(self, board: Board, now: int) -> bool:
         """Whether a board that is gone is there already on another line, as one that was switched off and on dials in
@@ -174,6 +184,12 @@ class ServerCore(Voice[Event]):
         """`tick` is to be called at ``when`` at the latest."""
         if self.on_wake is not None:
             self.on_wake(when)
+
+    def _log(self, finding: Finding) -> None:
+        """A board's node says what is wrong with the board."""
+        for board in self.boards:
+            if board.who == finding.who and board.node is not None:
+                board.node.log(_WARNING, finding.format())
 
     def _wake_in(self, ms: int) -> None:
         self.wake(self.clock() + ms)

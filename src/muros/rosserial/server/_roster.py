@@ -25,7 +25,7 @@ from muros.rosserial.server._endpoints import (
     ServiceServer,
     Subscription,
 )
-from muros.rosserial.server.events import EndpointSetUp
+from muros.rosserial.server.events import BufferKnown, EndpointSetUp
 
 if TYPE_CHECKING:
     from muros.rosserial.server._board import Board
@@ -53,6 +53,9 @@ class Roster:
         self.board = board
         self.endpoints: dict[Key, Endpoint] = {}
         self.incoming: dict[int, Callable[[bytes, int], bool]] = {}
+        self.input_buffer = 0
+        """The board's buffer for what it is sent; 0 until it was announced."""
+        self.output_buffer = 0
         self.in_doubt = False
         """Whether nothing is sent on any id until the board has said what it has: it stands still meanwhile."""
         self._halves: dict[tuple[int, str], tuple[int, dict[int, TopicInfo]]] = {}
@@ -60,6 +63,7 @@ class Roster:
 
     def named(self, half: int, info: TopicInfo) -> None:
         """The board names a topic, or one half of a service; ``half`` is the id of that frame."""
+        self._learn_buffer(half, info.buffer_size)
         branch = _BRANCHES[half]
         infos: tuple[TopicInfo, ...] = (info,)
         if branch in (ID_SERVICE_SERVER, ID_SERVICE_CLIENT):
@@ -69,6 +73,11 @@ class Roster:
             infos = both
         if self.board.node is not None:
             self._set_up(self._key(branch, infos), infos)
+
+    def renew(self) -> None:
+        """The line is new, and perhaps the board."""
+        self.input_buffer = self.output_buffer = 0
+        self.restart()
 
     def missing(self) -> list[Endpoint]:
         """What was not named after the last topic request, or those made again because of damage."""
@@ -163,6 +172,18 @@ class Roster:
                 del self.incoming[info.topic_id]
         endpoint.close()
 
+    def _learn_buffer(self, half: int, size: int) -> None:
+        board = self.board
+        if half in (ID_SUBSCRIBER, ID_SERVICE_SERVER + 1, ID_SERVICE_CLIENT + 1):
+            if not self.input_buffer:
+                board.tell(BufferKnown(board.label, "subscribe", size))
+            self.input_buffer = max(size, 0)
+        else:
+            if not self.output_buffer:
+                board.tell(BufferKnown(board.label, "publish", size))
+            self.output_buffer = max(self.output_buffer, size)
+            board.decoder.limit = min(board.core.limits.max_payload, max(self.output_buffer, OVERHEAD))
+
     def _full(self, name: str) -> str:
         """A name as the board's node means it."""
         node = self.board.node_name
@@ -250,7 +271,7 @@ class Roster:
         return client
 
     def _said(self, endpoint: Endpoint) -> None:
-        self.board.core.tell(
+        self.board.tell(
             EndpointSetUp(
                 self.board.label,
                 endpoint.kind,

@@ -145,8 +145,7 @@ class Server(LinkServer[Event, "_BoardDoor"]):
             self.core.stop()
 
     def _clear(self) -> None:
-        for board in list(self.core.boards):
-            self.core.remove(board, "the server stops")
+        self.core.close("the server stops")
         if self._in_space is not None:
             self._in_space.close()
 

@@ -39,7 +39,7 @@ def status_of(board: Board, now: int) -> tuple[int, str, dict[str, str]]:
         "topic requests": str(board.asks),
         "resets": str(board.resets),
         "round trip": "unknown" if board.round_trip is None else f"{board.round_trip} ms",
-        "publish buffer": f"{board.output_buffer} bytes",
-        "subscribe buffer": f"{board.input_buffer} bytes",
+        "publish buffer": f"{board.roster.output_buffer} bytes",
+        "subscribe buffer": f"{board.roster.input_buffer} bytes",
     }
     return level, text, values

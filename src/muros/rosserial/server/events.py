@@ -30,8 +30,9 @@ _VERSIONS = {0xFE: "hydro or later", 0xFF: "groovy or earlier"}
 
 @dataclass(frozen=True, slots=True)
 class Event(voice.Event):
-    """Something that happened to ``board``, which is named by its line."""
+    """Something that happened to ``board``, which is named by its line; ``severity`` is 1 info or 2 warning."""
 
+    severity = 1
     board: str
 
 
@@ -46,6 +47,7 @@ class LineUp(Event):
 class LineDown(Event):
     """A line or a whole link is gone; the server waits for it."""
 
+    severity = 2
     reason: str
 
     def text(self) -> str:
@@ -115,6 +117,7 @@ class BoardReady(Event):
 class BoardReset(Event):
     """A board has started again, or believes itself unconnected; it was asked for its topics anew."""
 
+    severity = 2
     words = "board {e.board} started again. Requesting topics..."
 
 
@@ -122,6 +125,7 @@ class BoardReset(Event):
 class BoardLost(Event):
     """A board is silent or its line is gone; its endpoints stay for ``kept`` seconds."""
 
+    severity = 2
     words = "Lost sync with device: board {e.board} ({e.reason}), kept for {e.kept:.0f} s"
     reason: str
     kept: float
