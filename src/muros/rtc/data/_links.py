@@ -13,12 +13,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Final, Protocol, TypeAlias
+from typing import Any, Final, Protocol, TypeAlias
 
 from muros.findings import Finding, Severity
 from muros.rtc.codes import BufferStatus, DataPortStatus, PeerLostError, PortStatus
 from muros.rtc.data._buffer import Buffer
-from muros.rtc.data._listeners import ConnectorEvent, ConnectorInfo, DataEvent, DataListeners
+from muros.rtc.data._listeners import ConnectorEvent, ConnectorInfo, DataEvent, DataListeners, changed_by
 from muros.rtc.data._options import DataOptions, Stamp, Subscription
 from muros.rtc.data._publishers import STORED, make_publisher
 from muros.rtc.data._ring import EmptyPolicy
@@ -124,16 +124,24 @@ class Link:
 
     def tell(self, event: DataEvent, sample: Sample) -> None:
         """Tell who listens; what they change counts for the sample. Nobody: nothing is decoded."""
-        callbacks = self._listeners.hearing(event)
-        if not callbacks:
+        callbacks = self._listeners.callbacks.get(event)
+        if callbacks is None:
             return
         try:
             value = sample.value
         except DataError:
             return  # it is told when it is read
-        changed, value = self._listeners.tell_value(event, callbacks, self.info, value)
-        if changed:
-            sample.replace(value)
+        for callback in callbacks:
+            try:
+                answer = callback(self.info, value)
+            except Exception as error:
+                self._listeners.failed(event, error)
+                continue
+            if answer is not None:
+                changed, now = changed_by(answer, value)
+                if changed:
+                    value = now
+                    sample.replace(value)
 
     def tell_connector(self, event: ConnectorEvent) -> None:
         """Tell who listens."""
@@ -213,7 +221,6 @@ class PushSender(Link):
         self._put: Final = inlet.put
         self._buffered: Final = setup.options.subscription is not Subscription.FLUSH
         self._stamps_sent: Final = Stamp.ON_SEND in setup.options.stamps
-        self._plain: Final = self._direct is None and not self._buffered and not self._stamps_sent
         self._publisher: Final = make_publisher(
             setup.options, self, name=f"{setup.who} {self._label}", clock=setup.clock
         )
@@ -222,15 +229,6 @@ class PushSender(Link):
         if self.closed:
             return DataPortStatus.PRECONDITION_NOT_MET
         codec, little = self._codec, self._little
-        if self._plain and not self._listeners.hears_values:
-            octets = outgoing.octets(codec, little)
-            try:
-                answer = self._put(octets)
-            except Exception as error:
-                return self._unsent(error, Sample(codec, little, octets))
-            if answer is PortStatus.PORT_OK:
-                return DataPortStatus.PORT_OK
-            return self._answered(answer, Sample(codec, little, octets))
         if self._direct is not None:
             sample = Sample(codec, little, None, copy_value(outgoing.value))
         elif self._buffered:
@@ -238,6 +236,29 @@ class PushSender(Link):
         else:
             sample = Sample(codec, little, outgoing.octets(codec, little), outgoing.value)
         return self._publisher.write(sample)
+
+    def straight_way(self) -> Callable[[Any], DataPortStatus] | None:
+        """`write` of a value in one step, where there is nothing to do but to encode and to bring it; else None.
+
+        After a pause each function that is called anew costs microseconds: this is most of a port's latency.
+        """
+        if self._direct is not None or self._buffered or self._stamps_sent:
+            return None
+        encode, little, put, listeners = self._codec.encode, self._little, self._put, self._listeners
+
+        def write(value: Any) -> DataPortStatus:
+            if listeners.hears_values or self.closed:
+                return self.write(Outgoing(value))
+            octets = encode(value, little)
+            try:
+                answer = put(octets)
+            except Exception as error:
+                return self._unsent(error, self._sample(octets))
+            if answer is PortStatus.PORT_OK:
+                return DataPortStatus.PORT_OK
+            return self._answered(answer, self._sample(octets))
+
+        return write
 
     def send(self, sample: Sample) -> DataPortStatus:
         """Bring it to the InPort. Never raises."""

@@ -15,6 +15,7 @@ __all__ = [
     "ConnectorInfo",
     "DataEvent",
     "DataListeners",
+    "changed_by",
 ]
 
 
@@ -67,6 +68,13 @@ class Changes(IntFlag):
     BOTH_CHANGED = 3
 
 
+def changed_by(answer: object, value: object) -> tuple[bool, object]:
+    """What a listener's answer says: whether `value` has changed, and what it is now."""
+    if isinstance(answer, tuple) and len(answer) == 2:
+        answer, value = answer
+    return isinstance(answer, int) and bool(answer & Changes.DATA_CHANGED), value
+
+
 @dataclass(slots=True)
 class ConnectorInfo:
     """A connection as listeners see it."""
@@ -93,7 +101,8 @@ class DataListeners:
         self._connector: Final = Listeners[ConnectorEvent](on_error)
         self.hears_values = False
         """Whether anybody listens to any `DataEvent`: asked with every value."""
-        self._callbacks: dict[DataEvent, tuple[DataCallback, ...]] = {}
+        self.callbacks: dict[DataEvent, tuple[DataCallback, ...]] = {}
+        """Who listens to which; another dict after each change."""
 
     def add(
         self, event: DataEvent | ConnectorEvent, callback: Callable[..., object]
@@ -113,35 +122,14 @@ class DataListeners:
         self._note()
         return removed
 
-    def hearing(self, event: DataEvent) -> tuple[DataCallback, ...]:
-        """Who listens to this one."""
-        return self._callbacks.get(event, ())
-
-    def tell_value(
-        self, event: DataEvent, callbacks: tuple[DataCallback, ...], info: ConnectorInfo, value: object
-    ) -> tuple[bool, object]:
-        """Tell them; whether the value was changed, and the value as it is now."""
-        changed = False
-        for callback in callbacks:
-            try:
-                answer = callback(info, value)
-            except Exception as error:
-                self._on_error(event, error)
-                continue
-            if answer is None:
-                continue
-            if isinstance(answer, tuple) and len(answer) == 2:
-                answer, replacement = answer
-                if isinstance(answer, int) and answer & Changes.DATA_CHANGED:
-                    value = replacement
-            if isinstance(answer, int) and answer & Changes.DATA_CHANGED:
-                changed = True
-        return changed, value
+    def failed(self, event: DataEvent, error: Exception) -> None:
+        """A callback has raised."""
+        self._on_error(event, error)
 
     def tell(self, event: ConnectorEvent, info: ConnectorInfo) -> None:
         """Tell who listens."""
         self._connector.tell(event, info)
 
     def _note(self) -> None:
-        self._callbacks = {event: heard for event in DataEvent if (heard := self._data.of(event))}
-        self.hears_values = bool(self._callbacks)
+        self.callbacks = {event: heard for event in DataEvent if (heard := self._data.of(event))}
+        self.hears_values = bool(self.callbacks)

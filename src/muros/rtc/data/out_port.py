@@ -53,6 +53,7 @@ class DataOutPort(DataPort[T]):
         self.status: list[DataPortStatus] = []
         """What became of the value written last, by connection (`connector_infos`)."""
         self._out_links: tuple[OutLink, ...] = ()
+        self._straight: tuple[Callable[[T], DataPortStatus], OutLink] | None = None
         self._stamps = False
 
     def write(self, value: T) -> bool:
@@ -60,6 +61,24 @@ class DataOutPort(DataPort[T]):
 
         DataError where the data type cannot hold the value. Nothing that a receiver does raises here.
         """
+        straight = self._straight
+        if straight is not None and self.on_write is None and self.on_write_convert is None:
+            send, link = straight
+            one = send(value)
+            self.status = [one]
+            if one is DataPortStatus.CONNECTION_LOST:
+                self._drop(link.info.connector_id)
+            return one is DataPortStatus.PORT_OK
+        return self._write(value)
+
+    def write_after(self) -> bool:
+        """Write `value`, if there is one. For components that write all ports after they ran."""
+        return self.value is not None and self.write(self.value)
+
+    # ---- inside
+
+    def _write(self, value: T) -> bool:
+        """Every other way."""
         if self.on_write is not None:
             self._call_back("on_write", self.on_write, value)
         if self.on_write_convert is not None:
@@ -83,12 +102,6 @@ class DataOutPort(DataPort[T]):
         if not good:
             self._drop_lost(links, status)
         return good
-
-    def write_after(self) -> bool:
-        """Write `value`, if there is one. For components that write all ports after they ran."""
-        return self.value is not None and self.write(self.value)
-
-    # ---- inside
 
     def _drop_lost(self, links: tuple[OutLink, ...], status: list[DataPortStatus]) -> None:
         for one, link in zip(status, links, strict=True):
@@ -116,3 +129,8 @@ class DataOutPort(DataPort[T]):
         links = tuple(self._links_by_id.values())
         self._out_links = tuple(link for link in links if isinstance(link, (PushSender, PullSource)))
         self._stamps = any(Stamp.ON_WRITE in link.options.stamps for link in self._out_links)
+        self._straight = None
+        if len(links) == 1 and not self._stamps:
+            (only,) = links
+            if isinstance(only, PushSender) and (way := only.straight_way()) is not None:
+                self._straight = (way, only)
