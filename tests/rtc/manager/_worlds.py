@@ -11,6 +11,8 @@ from muros.rtc.component import Component
 from muros.rtc.manager import Manager, Settings
 from muros.rtc.manager._defaults import DEFAULTS
 from muros.rtc.manager._world import RemoteManager
+from muros.rtc.ports import Port
+from muros.rtc.profiles import PeerPort
 from muros.rtc.properties import Properties
 
 
@@ -74,6 +76,16 @@ class MemoryWorld:
 
     def is_same(self, one: object, other: object) -> bool:
         return one == other
+
+    def port_reference(self, port: Port) -> object:
+        return port
+
+    def ports_in(self, context: str, kind: str) -> Sequence[tuple[str, PeerPort]]:
+        return [
+            (name.rpartition("/")[2].removesuffix(f".{kind}"), port)
+            for name, port in self.server.bound.items()
+            if name.startswith(f"{context}/") and name.endswith(f".{kind}") and isinstance(port, Port)
+        ]
 
     def member(self, name: str) -> None: ...
 

@@ -94,6 +94,7 @@ def test_components_come_and_go_by_corbaloc(managers: Managers, world: CorbaWorl
     assert manager.reference.load_module("None.py", "")._v == ReturnCode.RTC_ERROR
     assert manager.reference.unload_module("Wheel.py")._v == ReturnCode.RTC_OK
     assert manager.reference.set_configuration("a.b", "c")._v == ReturnCode.RTC_OK
+    assert manager.reference.set_configuration("a.b", "c" * 70_000)._v == ReturnCode.OUT_OF_RESOURCES
     assert manager.reference.fork()._v == ReturnCode.UNSUPPORTED
     assert manager.delete_component("Wheel0") is ReturnCode.RTC_OK
     assert process.wait(20) == 0  # the last component has gone
@@ -212,6 +213,50 @@ def test_addresses_of_other_processes(
     for wrong in ("rtcname://*/Nobody", f"rtcloc://127.0.0.1:{port}/test/Nobody", "ftp://x/y"):
         with pytest.raises(RtcError, match=r"no such component|write rtcname"):
             world.activate_at(wrong)
+
+
+TALKERS = """
+from RTC import TimedLong
+from muros.rtc import Component, InPort, OutPort
+class Talker(Component):
+    out = OutPort(TimedLong)
+    def on_execute(self, context):
+        self.out.write(7)
+class Listener(Component):
+    values = InPort(TimedLong)
+    def on_execute(self, context):
+        if self.values.is_new():
+            print(f"heard {self.values.read().data}", flush=True)
+"""
+
+
+@pytest.mark.parametrize("first", ["Talker", "Listener"])
+def test_ports_meet_in_a_topic(managers: Managers, world: CorbaWorld, first: str) -> None:
+    """Whoever comes first; one that is in no topic, or in another, stays alone."""
+    (managers.folder / "Talkers.py").write_text(TALKERS)
+    topics = (
+        "-o",
+        "port.outport.out.publish_topic:news, weather",
+        "-o",
+        "port.inport.values.subscribe_topic:news",
+    )
+    second = "Listener" if first == "Talker" else "Talker"
+    processes = {
+        name: managers.start(
+            *(*topics, "-o", f"manager.components.precreate:{name}"),
+            *("-o", f"manager.components.preactivation:{name}0", "-o", "exec_cxt.periodic.rate:50"),
+        )
+        for name in (first, second)
+    }
+    managers.wait_for(processes["Listener"], "heard 7")
+    server = world._names.servers[0]
+    names = [binding.name for binding in server.list("dataports.port_cxt/news.topic_cxt")]
+    assert sorted(names) == ["Listener0.values", "Talker0.out"]
+    processes["Talker"].send_signal(signal.SIGTERM)
+    processes["Talker"].wait(20)
+    names = [binding.name for binding in server.list("dataports.port_cxt/news.topic_cxt")]
+    assert names == ["Listener0.values"]
+    assert server.list("dataports.port_cxt/weather.topic_cxt") == []
 
 
 STUCK = """

@@ -14,7 +14,7 @@ from omniORB import any
 from muros.rtc.codes import PeerLostError, ReturnCode, RtcError
 from muros.rtc.corba._conversion import to_nv_list, to_return_code
 from muros.rtc.corba._lost import peer
-from muros.rtc.corba._naming import Names, NameServer, is_same, lives, split_path
+from muros.rtc.corba._naming import Names, NameServer, _quoted, is_same, lives, split_path
 from muros.rtc.corba._orb import Orb, current_orb, start_orb
 from muros.rtc.corba._organization import ForeignMember
 from muros.rtc.corba._setup import set_up
@@ -25,6 +25,8 @@ from muros.rtc.reports import Reporter
 if TYPE_CHECKING:
     from muros.rtc.component import Component
     from muros.rtc.manager import Manager
+    from muros.rtc.ports import Port
+    from muros.rtc.profiles import PeerPort
 
 __all__ = ["CorbaWorld", "ManagerServant", "PeerManager"]
 
@@ -33,6 +35,12 @@ DEFAULT_KEY: Final = "manager"
 
 MASTER_PORT: Final = 2810
 """TCP port of a master manager whose address has none."""
+
+SETTINGS: Final = 10_000
+"""Settings that a manager may have before others can add no more."""
+
+SETTING_LENGTH: Final = 65536
+"""Characters that others may set at once."""
 
 NAME_TIMEOUT: Final = 2.0
 """Seconds that one question to a name server may take."""
@@ -109,7 +117,10 @@ class ManagerServant(RTM__POA.Manager):  # type: ignore[misc]
         return to_nv_list(self._manager.configuration())
 
     def set_configuration(self, name: str, value: str) -> Any:
-        self._manager.settings[name] = value
+        settings = self._manager.settings
+        if len(name) + len(value) > SETTING_LENGTH or (name not in settings and len(settings) >= SETTINGS):
+            return RTC.OUT_OF_RESOURCES
+        settings[name] = value
         return RTC.RTC_OK
 
     def is_master(self) -> bool:
@@ -400,6 +411,25 @@ class CorbaWorld:
 
     def is_same(self, one: Any, other: Any) -> bool:
         return is_same(one, other)
+
+    def port_reference(self, port: Port) -> Any:
+        return self._objects.port(port)
+
+    def ports_in(self, context: str, kind: str) -> list[tuple[str, PeerPort]]:
+        found: list[tuple[str, PeerPort]] = []
+        with _patience(NAME_TIMEOUT):
+            for server in self._answering():
+                try:
+                    names = [one.name for one in server.list(context) if one.kind == kind]
+                    paths = [(name, f"{context}/{_quoted(name)}.{kind}") for name in names]
+                    bound = [(name, server.resolve(path)) for name, path in paths]
+                except PeerLostError:
+                    self._asked[server.address] = time.monotonic()
+                    continue
+                except RtcError:
+                    continue  # nobody has that topic there
+                found += [(name, self._objects.port_behind(one)) for name, one in bound if lives(one)]
+        return found
 
     def member(self, name: str) -> ForeignMember | None:
         try:

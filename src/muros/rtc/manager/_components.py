@@ -96,6 +96,7 @@ class Components:
             self._references.pop(name, None)
             names = self._names.pop(name, ())
         manager.world.unbind(names)
+        manager.topics.leave(component)
         manager.listeners.tell(ManagerEvent.NAMES_UNBOUND, component, names)
         manager.world.withdraw_component(component)
         factory = manager.factories.release(name)
@@ -183,6 +184,7 @@ class Components:
         if manager.settings.flag("naming.enable"):
             manager.world.bind(names, reference)
             manager.listeners.tell(ManagerEvent.NAMES_BOUND, component, names)
+            manager.topics.join(component)
         manager.log.logger.info("component %s is there as %s", name, ", ".join(names))
         manager.listeners.tell(ManagerEvent.COMPONENT_CREATED, component)
 

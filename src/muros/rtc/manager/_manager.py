@@ -36,6 +36,7 @@ from muros.rtc.manager._requests import (
 )
 from muros.rtc.manager._settings import Settings
 from muros.rtc.manager._timer import Timer
+from muros.rtc.manager._topics import Topics
 from muros.rtc.manager._world import World
 from muros.rtc.ports import Port
 from muros.rtc.profiles import ConnectorProfile, Reference
@@ -84,6 +85,7 @@ class Manager:
         self._make_world = world
         self._world: World | None = None
         self._colleagues: Colleagues | None = None
+        self._topics: Topics | None = None
         self._components: Final = Components(self, self._component_ended)
         self._modules_of: dict[Path, list[Factory]] = {}
         self._loading: Path | None = None
@@ -114,15 +116,22 @@ class Manager:
     def world(self) -> World:
         """The ORB and what it leads to. RtcError before `start`."""
         if self._world is None:
-            raise RtcError("the manager has not been started: call start first")
+            raise _not_started()
         return self._world
 
     @property
     def colleagues(self) -> Colleagues:
         """The other managers. RtcError before `start`."""
         if self._colleagues is None:
-            raise RtcError("the manager has not been started: call start first")
+            raise _not_started()
         return self._colleagues
+
+    @property
+    def topics(self) -> Topics:
+        """The topics that ports meet in. RtcError before `start`."""
+        if self._topics is None:
+            raise _not_started()
+        return self._topics
 
     def configuration(self) -> dict[str, str]:
         """All settings, defaults among them."""
@@ -140,6 +149,7 @@ class Manager:
             raise RtcError("the manager has been started already")
         self._world = world = (self._make_world or _corba_world)(self)
         self.settings.update(world.properties())
+        self._topics = Topics(world, self.reporter)
         self._colleagues = Colleagues(world, self.settings, self.reporter)
         self._bind_to_processors()
         self.log.logger.info(
@@ -157,6 +167,7 @@ class Manager:
                 self._every("corba.update_master_manager.interval", self._colleagues.find_master)
         if self.settings.flag("naming.enable") and self.settings.flag("naming.update.enable"):
             self._every("naming.update.interval", world.update_names)
+            self._every("naming.update.interval", self._topics.update)
         self.timer.every(1.0, self.reporter.tick)
         for name in self.settings.words("manager.modules.preload"):
             self._try("preload", name, lambda name=name: self.load_module(name))  # type: ignore[misc]
@@ -486,6 +497,10 @@ def _without(request: CreateRequest) -> str:
         {k: v for k, v in request.properties.items() if k not in ("manager_name", "manager_address")}
     )
     return str(CreateRequest(request.id, rest))
+
+
+def _not_started() -> RtcError:
+    return RtcError("the manager has not been started: call start first")
 
 
 def _corba_world(manager: Manager) -> World:

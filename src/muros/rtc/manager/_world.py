@@ -10,12 +10,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
 from muros.rtc.codes import ReturnCode
-from muros.rtc.profiles import Reference
+from muros.rtc.profiles import PeerPort, Reference
 
 if TYPE_CHECKING:
     from muros.rtc.component import Component
     from muros.rtc.manager._manager import Manager
     from muros.rtc.organization import Member
+    from muros.rtc.ports import Port
 
 __all__ = ["RemoteManager", "World"]
 
@@ -110,6 +111,14 @@ class World(Protocol):
 
     def is_same(self, one: Reference, other: Reference) -> bool:
         """Whether both lead to the same object."""
+        ...
+
+    def port_reference(self, port: Port) -> Reference:
+        """How others call a port."""
+        ...
+
+    def ports_in(self, context: str, kind: str) -> Sequence[tuple[str, PeerPort]]:
+        """The ports that have names of a kind in a context of the naming service, with these names."""
         ...
 
     def member(self, name: str) -> Member | None:
