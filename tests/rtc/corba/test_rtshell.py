@@ -136,6 +136,22 @@ def test_a_system_is_kept_taken_down_and_brought_back(world: World) -> None:
     world.run("rtteardown", "system.rtsys")
 
 
+def test_a_state_machine(world: World) -> None:
+    """rtfsm finds nobody to ask in the real package."""
+    door = f"{world.root}/test.host_cxt/Door0.rtc"
+    world.run("rtact", door)
+    world.until(lambda: world.run("rtfsm", door, "getstate").strip() == "Closed")
+    assert "turn" in world.run("rtfsm", door, "geteventprofiles")
+    assert '<transition event="turn"' in world.run("rtfsm", door, "getstructure")
+    world.run("rtdeact", door)
+
+
+def test_a_page_about_a_component(world: World) -> None:
+    text = world.run("rtdoc", "-f", "rst", world.giver)
+    assert '"out", "DataOutPort"' in text
+    assert '"step"' in text
+
+
 def test_ending_and_clearing_away(world: World) -> None:
     world.run("rtexit", world.taker)
     world.until(lambda: world.server.resolve("test.host_cxt/Taker0.rtc") is None)

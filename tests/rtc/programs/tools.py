@@ -1,6 +1,7 @@
-"""Two components that tools are tried on: one gives numbers, the other says which it has got."""
+"""Components that tools are tried on: one gives numbers, one says which it has got, one is a state machine."""
 
 from muros.rtc import Component, InPort, OutPort, Parameter, ReturnCode
+from muros.rtc.fsm import State, StateMachine
 from RTC import Time, TimedLong
 
 
@@ -35,3 +36,27 @@ class Taker(Component):
     def on_execute(self, context: int) -> None:
         if self.inp.is_new():
             print("got", self.inp.read().data, flush=True)
+
+
+class Whole(State):
+    """A door."""
+
+    def on_init(self) -> None:
+        self.go(Closed)
+
+    def turn(self) -> None:
+        """An event."""
+
+
+class Closed(State, within=Whole):
+    """Where it begins."""
+
+
+class Door(Component):
+    """Opens and closes."""
+
+    category = "test"
+    machine = StateMachine(Whole)
+
+    def on_execute(self, context: int) -> None:
+        self.machine.run_events()
