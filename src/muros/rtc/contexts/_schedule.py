@@ -119,15 +119,19 @@ class Anticipation:
     `seconds` says by how much; after half of the wake-ups a little time is left, which the thread spins away.
     """
 
-    __slots__ = ("seconds",)
+    __slots__ = ("_known", "seconds")
 
     def __init__(self) -> None:
         self.seconds = 0.0
+        self._known = False
 
     def learn(self, late: float) -> None:
         """A thread that was to be woken at some moment ran `late` seconds after it."""
-        step = self.seconds * _STEP + _LEAST_STEP
-        wanted = self.seconds + (step if late > self.seconds else -step)
+        if self._known:
+            step = self.seconds * _STEP + _LEAST_STEP
+            wanted = self.seconds + (step if late > self.seconds else -step)
+        else:
+            wanted, self._known = late, True
         self.seconds = min(max(wanted, 0.0), MOST_ANTICIPATED)
 
 
