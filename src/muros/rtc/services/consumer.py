@@ -22,8 +22,8 @@ class Consumer:
     def __init__(self, interface: Any = None) -> None:
         self.interface = interface
         """The class that an IDL compiler made for callers; None where objects are not to be narrowed."""
-        self.label = "the service"
-        """What errors call it; the port says it when the consumer is registered."""
+        self.name_by: Callable[[], str] = lambda: "the service"
+        """What errors call it; the port that it is registered at says it."""
         self._providers: dict[str, Any] = {}
         self._objects: ServiceObjects | None = None
         self._lock: Final = threading.Lock()
@@ -48,7 +48,7 @@ class Consumer:
         provider = self._current
         if provider.object is None:
             raise NotConnectedError(
-                f"{self.label} is not connected, {operation} cannot be called: connect its port with one that "
+                f"{self.name_by()} is not connected, {operation} cannot be called: connect its port with one that "
                 "provides the interface (rtcon, or an editor), or look at is_connected before"
             )
         call = provider.calls.get(operation)
@@ -86,7 +86,7 @@ class Consumer:
                 meant = self._objects.explain(error) if self._objects is not None else None
                 if meant is None:
                     raise
-                raise type(meant)(f"{self.label}: {meant}") from error
+                raise type(meant)(f"{self.name_by()}: {meant}") from error
 
         return checked
 

@@ -76,7 +76,7 @@ class ServicePort(Port):
         """Require an interface, which is called through `consumer`. RtcError: the names are taken."""
         key = self._new_key(instance_name, type_name)
         self._consumers = {**self._consumers, key: consumer}
-        consumer.label = f"{type_name} {instance_name} of port {self.full_name}"
+        consumer.name_by = lambda: f"{type_name} {instance_name} of port {self.full_name}"
         return consumer
 
     def activate(self) -> None:
