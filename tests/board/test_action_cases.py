@@ -50,7 +50,7 @@ class Pair:
                 lambda goal: self.agrees,
                 goals=5,
                 result_timeout=result_timeout,
-                clock=lambda: (7, 8),
+                clock=lambda: (7, self.broker.now),
             )
         )
         self.client = self.broker.context().node("client").action_client(Fibonacci, "count")
@@ -93,7 +93,7 @@ def test_a1_b1_a_goal_is_accepted() -> None:
     assert (goal.accepted, goal.status) == (None, 0)
     pair.broker.until(lambda: pair.responses)
     assert pair.responses == [(goal, True)]
-    assert goal.stamp == (7, 8)
+    assert (goal.stamp[0], 1000 < goal.stamp[1] <= pair.broker.now) == (7, True)
     assert pair.result(goal) == [0, 1, 1, 2, 3]
     assert pair.client.goals == []
 
@@ -177,3 +177,36 @@ def test_b9_a_result_is_kept_for_who_asks_late_and_then_forgotten() -> None:
     pair.broker.until(lambda: late.send(request, replies.append))
     pair.broker.until(lambda: len(replies) == 2)
     assert replies[1].status == 0, "nobody knows it any more"
+
+
+def test_who_is_cancelled() -> None:
+    """By an id, by a time, by both, or all: the policies of action_msgs/srv/CancelGoal."""
+    pair = Pair()
+    goals: "list[Any]" = []
+    for _ in range(4):
+        goals.append(pair.send(10000))
+        pair.broker.until(lambda: goals[-1].status == _EXECUTING)
+        pair.broker.run(10)
+    answers: "list[Any]" = []
+
+    def cancel(identity: "bytes | None", stamp: "tuple[int, int] | None") -> "tuple[int, list[bytes]]":
+        answers.clear()
+        pair.broker.until(
+            lambda: pair.client.cancel(identity, stamp, lambda code, ids: answers.append((code, ids)))
+        )
+        pair.broker.until(lambda: answers)
+        code, ids = answers[0]
+        return code, sorted(ids)
+
+    assert cancel(bytes(range(16)), None) == (2, []), "nobody knows it"
+    assert cancel(None, (7, goals[0].stamp[1])) == (0, [goals[0].id])
+    pair.result(goals[0])
+    assert cancel(goals[0].id, None) == (3, []), "it has ended"
+    assert cancel(goals[2].id, (7, goals[1].stamp[1])) == (0, sorted([goals[1].id, goals[2].id]))
+    pair.agrees = False
+    assert cancel(None, None)[0] == 1
+    pair.agrees = True
+    assert goals[3].id in cancel(None, None)[1]
+    for goal in goals:
+        pair.result(goal)
+        assert goal.status == _CANCELED

@@ -10,7 +10,12 @@ from muros.rclc import (
     ParameterRejectedError,
     ParameterTypeError,
 )
-from muros.rclc.parameter_errors import InvalidParameterError, ParameterChangingError, ParameterMemoryError
+from muros.rclc.parameter_errors import (
+    InvalidParameterError,
+    ParameterChangingError,
+    ParameterMemoryError,
+    ParameterTimeoutError,
+)
 from tests.board.broker import Broker
 from tests.board.harness import raises
 
@@ -309,3 +314,80 @@ def test_waiting_for_parameters_ends_where_ticks_wrap() -> None:
     pair.remote.node.context.clock = lambda: ticks_add(first, broker.now)
     assert not nobody.wait(2.0)
     assert 2000 <= broker.now - start < 2100
+
+
+EVERY_TYPE: "dict[str, Any]" = {
+    "b": True,
+    "i": -(1 << 63),
+    "d": 1.5,
+    "s": "grüß dich",
+    "bytes": b"\x00\xff",
+    "bs": [True, False],
+    "is": [1, -1, (1 << 63) - 1],
+    "ds": [0.25, -2.0],
+    "ss": ["a", "", "b"],
+}
+
+
+def test_every_type() -> None:
+    pair = Pair(max=20)
+    for name in EVERY_TYPE:
+        pair.parameters.declare(name, EVERY_TYPE[name])
+    pair.broker.settle()
+    names = sorted(EVERY_TYPE)
+    assert pair.remote.list() == names
+    assert pair.remote.get(names) == EVERY_TYPE
+    assert sorted(pair.remote.types(names).values()) == list(range(1, 10))
+    changed: "dict[str, Any]" = {
+        "i": 7,
+        "s": "x" * 600,
+        "is": list(range(40)),
+        "ss": ["y"] * 20,
+        "bytes": b"abc",
+    }
+    assert pair.remote.update(changed) == ""
+    assert pair.remote.get(list(changed)) == changed
+    for name in changed:
+        assert pair.parameters.get(name) == changed[name]
+
+
+def test_set_atomically_is_all_or_none() -> None:
+    pair = Pair()
+    pair.parameters.declare("a", 1)
+    pair.parameters.declare("b", 2, range=(0, 5))
+    pair.broker.settle()
+    assert refusal(pair.remote.update, {"a": 7, "b": 6}) == "Parameter {b} doesn't comply with integer range."
+    assert pair.remote.get(["a", "b"]) == {"a": 1, "b": 2}
+    assert pair.remote.update({"a": 7, "b": 5}) == ""
+    with raises(ParameterRejectedError):
+        pair.remote.update({"a": 8, "b": 6}, False)
+    assert pair.remote.get(["a", "b"]) == {"a": 8, "b": 5}
+
+
+def test_list_with_prefixes_and_depth() -> None:
+    pair = Pair(max=9)
+    every = ["a", "a.b", "a.b.c", "ab", "x.y"]
+    for name in reversed(every):
+        pair.parameters.declare(name, 1)
+    pair.broker.settle()
+    cases: "list[tuple[list[str], int, list[str]]]" = [
+        ([], 0, every),
+        ([], 1, ["a", "ab"]),
+        (["a"], 0, ["a", "a.b", "a.b.c"]),
+        (["a"], 1, ["a", "a.b"]),
+        (["a.b", "x"], 1, ["a.b", "a.b.c", "x.y"]),
+        (["nobody"], 0, []),
+    ]
+    for prefixes, depth, wanted in cases:
+        assert pair.remote.list(prefixes, depth) == pair.parameters.list(prefixes, depth) == wanted
+
+
+def test_nobody_answers() -> None:
+    pair = Pair()
+    nobody = ParameterClient(pair.remote.node, "/lab/nobody", 0.1)
+    pair.broker.settle()
+    failure(ParameterTimeoutError, 2, nobody.list)
+    got: "list[Any]" = []
+    nobody.list(then=got.append)
+    pair.broker.until(lambda: got)
+    assert isinstance(got[0], ParameterTimeoutError)
