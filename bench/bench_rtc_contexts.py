@@ -5,7 +5,8 @@ Run from a checkout: python bench/bench_rtc_contexts.py [--seconds 3] [--runs 5]
 Both call an empty function at 100 Hz and at 1 kHz; "ours" is a component's on_execute in a PeriodicExecutionContext,
 "catch up" the same with `catch_up: 50`, "fifo" with `scheduling: fifo:50` where the system permits it. Every measure is
 a process of its own; they take turns, so that each meets the same machine. The medians of all runs are shown, and the
-best run in brackets. Lateness is how far behind its deadline a call began; what is missed is left out without `catch_up`.
+best run in brackets. Lateness is how far behind its deadline a call began; what is missed is left out without a
+`catch_up`.
 Aims: 1000.0 Hz, p99 under 200 us on an idle machine.
 """
 

@@ -92,3 +92,49 @@ def test_a_component_lives_as_one_of_openrtm(
     else:
         expected_trace = told["trace"]
     assert trace == expected_trace
+
+
+def test_a_component_with_two_contexts_has_a_life_in_each() -> None:
+    """Two rates: fast ticks do not run what the slow context activated."""
+    calls: list[int] = []
+
+    class Both(Component):
+        def on_execute(self, context: int) -> None:
+            calls.append(context)
+
+    component = Both()
+    component.configure(
+        "", {"execution_contexts": "SynchExtTriggerEC(f), SynchExtTriggerEC(s)", "ec.s.rate": "10"}
+    )
+    component.initialize()
+    fast, slow = component.owned_contexts
+    assert (fast.rate, slow.rate) == (1000.0, 10.0)
+    me = component.participation
+    fast.activate_component(me)
+    for _ in range(3):
+        fast.tick()
+    slow.tick()
+    assert calls == [0, 0, 0]
+    assert (component.state(0).name, component.state(1).name) == ("ACTIVE_STATE", "INACTIVE_STATE")
+    slow.activate_component(me)
+    slow.tick()
+    assert calls == [0, 0, 0, 1]
+    assert component.context_of(1) is slow
+    component.exit()
+
+
+def test_components_that_name_the_same_context_share_it() -> None:
+    properties = {"execution_contexts": "SynchExtTriggerEC(shared-by-two)"}
+    components = [Component(), Component()]
+    for component in components:
+        component.configure("", properties)
+        component.initialize()
+    (context,), (other,) = (component.owned_contexts for component in components)
+    assert context is other
+    for component in components:
+        assert context.activate_component(component.participation) is ReturnCode.RTC_OK
+    components[0].exit()
+    assert not context.is_closed
+    assert components[1].state().name == "ACTIVE_STATE"
+    components[1].exit()
+    assert context.is_closed
