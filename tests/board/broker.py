@@ -41,6 +41,14 @@ class Line(Agent):
         self.objects: "dict[int, Any]" = {}
         self.pieces = b""
 
+    def restart(self) -> None:
+        """The agent is another one, which knows nobody; what was under way is gone."""
+        self.objects.clear()
+        self.inbox.clear()
+        self.pieces = b""
+        self.knows = 0
+        self._next = self._expected = 0
+
     def wait(self, timeout: int) -> None:
         """Others go on meanwhile."""
         if not self.inbox:

@@ -409,3 +409,30 @@ def test_r23_guard_condition() -> None:
 
 def test_errors_bear_codes() -> None:
     assert (RclError.code, InvalidNameError.code) == (1, 201)
+
+
+def test_an_agent_that_begins_again() -> None:
+    """Everything is made again, and goes on; what had been taken for sending arrives."""
+    pair = Pair(keepalive=100)
+    publisher = pair.one.publisher(Int32, "value")
+    pair.other.subscription(Int32, "value", pair.keep)
+    pair.other.service(AddTwoInts, "add", answer)
+    client = pair.one.client(AddTwoInts, "add")
+    pair.broker.settle()
+    before = [dict(line.objects) for line in pair.broker.lines]
+    pair.say(publisher, 1)
+    for line in pair.broker.lines:
+        line.quiet = True
+    assert publisher.publish(Int32(data=2)), "nobody has noticed yet"
+    pair.broker.run(5000)
+    assert [executor.context.state for executor in pair.broker.executors] == ["LOST", "LOST"]
+    assert not publisher.publish(Int32(data=3))
+    for line in (pair.broker.lines[1], pair.broker.lines[0]):
+        line.restart()
+        line.quiet = False
+        pair.broker.run(3000)
+    pair.broker.settle()
+    assert [line.objects for line in pair.broker.lines] == before
+    pair.say(publisher, 4)
+    assert pair.got == [1, 2, 4]
+    assert client.call(AddTwoInts.Request(a=1, b=2)).sum == 3
