@@ -17,10 +17,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from muros import interfaces
-from muros.rtc.codes import DataPortStatus, ReturnCode
-from muros.rtc.data import DataEvent, DataInPort, DataOutPort, DataPort, marshaling_types
+from muros.rtc.codes import DataPortStatus, PeerLostError, ReturnCode
+from muros.rtc.data import DataEvent, DataInPort, DataOutPort, DataPort, TransportError, marshaling_types
 from muros.rtc.data._types import DataError
-from muros.rtc.data.space._hall import HALL
+from muros.rtc.data.space import _hall, _transport
+from muros.rtc.data.space._hall import HALL, Hall
 from muros.rtc.data.space._messages import TYPES, codec_of, default_message
 from muros.rtc.profiles import ConnectorProfile
 from tests.rtc.data.kit import Pair, TimedLong, TimedLongType, long
@@ -311,3 +312,74 @@ def test_other_messages_and_names(both: Pair) -> None:
     topics = {topic.name: topic.types for topic in room.space.graph.topics}
     assert topics == {"rt/out": ("std_msgs::msg::dds_::Int64_",)}
     port.disconnect_all()
+
+
+def test_what_the_hall_cannot_take_is_refused(both: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The hall's thread stands still: writes go on, until as many wait as may."""
+    monkeypatch.setattr(_transport, "BACKLOG", 3)
+    join(both.out, space__url="local:")
+    entered, go_on = threading.Event(), threading.Event()
+
+    def stand_still() -> None:
+        entered.set()
+        go_on.wait(10)
+
+    HALL.post(stand_still)
+    assert entered.wait(10)
+    try:
+        assert [both.out.write(long(number)) for number in range(5)] == [True] * 3 + [False] * 2
+        assert both.out.status == [DataPortStatus.SEND_FULL]
+    finally:
+        go_on.set()
+    wait_for(lambda: both.out.write(long(9)))
+
+
+def test_what_an_inport_is_too_slow_for_is_counted(both: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_transport, "BACKLOG", 3)
+    entered, go_on = threading.Event(), threading.Event()
+
+    def stand_still(*arguments: object) -> None:
+        entered.set()
+        go_on.wait(10)
+
+    both.in_.add_listener(DataEvent.ON_RECEIVED, stand_still)
+    join(both.in_, qos__depth="100")
+    join(both.out, qos__depth="100")
+    try:
+        both.out.write(long(0))
+        assert entered.wait(10)
+        for number in range(1, 10):
+            wait_for(lambda number=number: both.out.write(long(number)))  # type: ignore[misc]
+        wait_for(lambda: "values-overwritten" in both.codes())
+    finally:
+        go_on.set()
+    assert any("rt/numbers dropped" in finding.what for finding in both.findings)
+
+
+def test_writing_when_the_hall_has_closed() -> None:
+    hall = Hall()
+    assert not hall.post(lambda: None)
+    pair = Pair()
+    join(pair.out)
+    link = pair.out._out_links[0]
+    inlet = link._inlet  # type: ignore[attr-defined]
+    pair.out.disconnect_all()
+    with pytest.raises(PeerLostError, match="closed"):
+        inlet.put(bytes(8))
+    inlet.close()
+
+
+def test_a_space_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_hall, "CALL_TIME", 0.05)
+    go_on = threading.Event()
+
+    def never(url: str) -> Any:
+        go_on.wait(10)
+        raise OSError("too late")
+
+    hall = Hall(never)
+    try:
+        with pytest.raises(TransportError, match="did not answer"):
+            hall.enter("local:", "node", print)
+    finally:
+        go_on.set()

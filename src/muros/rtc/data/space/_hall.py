@@ -141,7 +141,7 @@ class Hall:
     def _started(self) -> asyncio.AbstractEventLoop:
         if self._loop is None:
             loop = self._loop = asyncio.new_event_loop()
-            self._thread = threading.Thread(target=loop.run_forever, name="muros rtc space", daemon=True)
+            self._thread = threading.Thread(target=_serve, args=(loop,), name="muros rtc space", daemon=True)
             self._thread.start()
         return self._loop
 
@@ -150,9 +150,14 @@ class Hall:
             return
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(CALL_TIME)
-        if not self._thread.is_alive():
-            self._loop.close()
         self._loop = self._thread = None
+
+
+def _serve(loop: asyncio.AbstractEventLoop) -> None:
+    try:
+        loop.run_forever()
+    finally:
+        loop.close()
 
 
 HALL: Final = Hall()
