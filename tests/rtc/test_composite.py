@@ -319,24 +319,26 @@ def test_organizations() -> None:
     assert not mine.leave("x")
 
 
-def test_two_tools_at_once_leave_one_of_both_wishes(stage: Stage) -> None:
-    """Whichever comes last; contexts agree with the organization."""
+def test_what_tools_change_while_a_member_is_slow_to_come_is_done_then(stage: Stage) -> None:
+    """A second tool takes the member out again before it has been taken in: the context agrees in the end."""
     composite = stage.composite("")
-    wishes = [[LocalMember(stage.parts[name])] for name in ("Motor0", "Sensor0")]
-    begin = threading.Barrier(2)
+    slow, sensor = Foreign("Slow0"), LocalMember(stage.parts["Sensor0"])
+    came, go = threading.Event(), threading.Event()
 
-    def wish(members: list[LocalMember]) -> None:
-        begin.wait(10)
-        for _ in range(50):
-            composite.organization.set_members(members)
+    def suspend() -> None:
+        came.set()
+        assert go.wait(10)
 
-    threads = [threading.Thread(target=wish, args=(members,)) for members in wishes]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(10)
-    (member,) = composite.organization.members
-    assert [str(p) for p in composite.context.participants] == [f"<{member.instance_name}>"]
+    slow.suspend = suspend  # type: ignore[method-assign]
+    first = threading.Thread(target=composite.organization.set_members, args=([slow],))
+    first.start()
+    assert came.wait(10)
+    composite.organization.set_members([sensor])
+    go.set()
+    first.join(10)
+    assert composite.organization.members == (sensor,)
+    assert composite.context.participants == (sensor.participant,)
+    assert slow.calls == ["join", "leave", "resume"]
     composite.exit()
 
 
