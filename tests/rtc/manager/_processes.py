@@ -33,8 +33,14 @@ class Managers:
         self, *words: str, command: tuple[str, ...] = ("rtcd",), environment: Mapping[str, str] | None = None
     ) -> subprocess.Popen[str]:
         """A manager with these options over those that keep it to this test; it runs when this returns."""
+        return self.start_command(self.command(*words, command=command), environment)
+
+    def start_command(
+        self, command: list[str], environment: Mapping[str, str] | None = None
+    ) -> subprocess.Popen[str]:
+        """The same for a whole command line."""
         process = subprocess.Popen(
-            self.command(*words, command=command),
+            command,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,

@@ -15,7 +15,21 @@ def settings(folder: Path, *argv: str, environment: dict[str, str] | None = None
 
 
 def test_all_options() -> None:
-    argv = ["-a", "-d", "-i", "-f", "my.conf", "-p", "2811", "-o", "a.b: c:d ", "-o", "e:", "Comp.py"]
+    argv = [
+        "-a",
+        "-d",
+        "-i",
+        "-f",
+        "my.conf",
+        "-p",
+        "2811",
+        "-o",
+        "a.b: c:d ",
+        "-o",
+        "e:",
+        "Comp.py",
+        "--instance_name=Left",
+    ]
     assert parse_options(argv) == Options(
         "my.conf",
         True,
@@ -27,6 +41,7 @@ def test_all_options() -> None:
             "e": "",
         },
         ("Comp.py",),
+        "Left",
     )
 
 

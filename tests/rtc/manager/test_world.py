@@ -121,6 +121,19 @@ def test_a_master_makes_its_slaves_work(managers: Managers, world: CorbaWorld) -
     wait_until(lambda: not _answers(slave))
 
 
+def test_master_and_slaves_that_end_at_once_do_not_wait_for_each_other(
+    managers: Managers, world: CorbaWorld
+) -> None:
+    """They do for ever with the real ones."""
+    processes = [managers.start("-d")]
+    processes += [managers.start("-o", "corba.update_master_manager.interval:0.05") for _ in range(2)]
+    master = world.manager_at(managers.master_address)
+    wait_until(lambda: len(master.listed("get_slave_managers")) == 2)
+    for one in [PeerManager(reference) for reference in master.listed("get_slave_managers")] + [master]:
+        assert one.shutdown() is ReturnCode.RTC_OK
+    assert [process.wait(20) for process in processes] == [0, 0, 0]
+
+
 def test_a_slave_finds_a_master_that_comes_later(managers: Managers, world: CorbaWorld) -> None:
     managers.start("-o", "corba.update_master_manager.interval:0.05", "-o", "manager.instance_name:early")
     managers.start("-d")

@@ -15,8 +15,9 @@ from muros.findings import Finding
 from muros.rtc.codes import RtcError
 from muros.rtc.component import Component
 from muros.rtc.manager._manager import Manager
+from muros.rtc.manager._requests import ComponentId, CreateRequest
 from muros.rtc.manager._settings import Options, parse_options, read_settings
-from muros.rtc.properties import ConfError
+from muros.rtc.properties import ConfError, Properties
 
 __all__ = ["serve", "serve_files", "serve_manager"]
 
@@ -33,12 +34,13 @@ def serve(components: Sequence[type[Component]], argv: Sequence[str]) -> int:
     `argv` are a manager's options. Status 1: a component could not be made or the ORB not be started; 2: wrong use.
     """
 
-    def init(manager: Manager) -> None:
+    def init(manager: Manager, name: str) -> None:
         for component in components:
             manager.register(component)
-            manager.create_component(component.spec()["implementation_id"])
+            name = _create(manager, component.spec()["implementation_id"], name)
 
-    return serve_manager(argv, init)
+    options = _options(argv)
+    return options if isinstance(options, int) else _serve(options, lambda m: init(m, options.instance_name))
 
 
 def serve_files(argv: Sequence[str]) -> int:
@@ -66,8 +68,9 @@ def serve_files(argv: Sequence[str]) -> int:
                 own_way(manager)
             if before != set(manager.components):
                 continue
+            name = options.instance_name if file is files[0] else ""
             for factory in manager.factories_of(module):
-                manager.create_component(factory.name)
+                name = _create(manager, factory.name, name)
 
     return _serve(options, init)
 
@@ -77,13 +80,27 @@ def serve_manager(argv: Sequence[str], init: Callable[[Manager], object] | None 
 
     To be called in the main thread: SIGINT and SIGTERM end it; a second one ends it at once.
     """
+    options = _options(argv)
+    return options if isinstance(options, int) else _serve(options, init)
+
+
+def _options(argv: Sequence[str]) -> Options | int:
+    """The options of a command line without words; the exit status where it is wrong."""
     try:
         options = parse_options(argv)
         if options.words:
             raise ConfError(f"{options.words[0]!r} is no option of a manager")
     except ConfError as error:
         return _fail(error, WRONG_USE)
-    return _serve(options, init)
+    return options
+
+
+def _create(manager: Manager, kind: str, name: str) -> str:
+    """Make a component, called `name` if that is not empty; "", the name of those that follow."""
+    manager.create_component(
+        CreateRequest(ComponentId(kind), Properties({"instance_name": name} if name else {}))
+    )
+    return ""
 
 
 def _serve(options: Options, init: Callable[[Manager], object] | None) -> int:

@@ -39,7 +39,9 @@ OPTIONS_HELP: Final = """\
   -o KEY:VALUE  set one key, whatever the file says; may be given several times
   -p PORT       listen on PORT (corba.endpoints)
   -d            be a master manager
-  -a            do not offer the manager itself to tools"""
+  -a            do not offer the manager itself to tools
+  --instance_name=NAME
+                what the first component is to be called"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +54,8 @@ class Options:
     """What `-o`, `-p`, `-d` and `-a` set."""
     words: tuple[str, ...] = ()
     """What is no option."""
+    instance_name: str = ""
+    """The name that the first component made is to have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,12 +69,12 @@ class Settings:
 def parse_options(argv: Sequence[str]) -> Options:
     """The options of a command line without the program's name. ConfError for what is none."""
     try:
-        pairs, words = getopt.gnu_getopt(list(argv), "adif:o:p:")
+        pairs, words = getopt.gnu_getopt(list(argv), "adif:o:p:", ["instance_name="])
     except getopt.GetoptError as error:
         raise ConfError(
             f"{error.msg}; the options are -a, -d, -f FILE, -i, -o KEY:VALUE and -p PORT"
         ) from error
-    file, ignore_missing, overrides = "", False, dict[str, str]()
+    file, instance_name, ignore_missing, overrides = "", "", False, dict[str, str]()
     for option, value in pairs:
         if option == "-f":
             file = value
@@ -80,6 +84,8 @@ def parse_options(argv: Sequence[str]) -> Options:
             overrides["manager.corba_servant"] = "NO"
         elif option == "-d":
             overrides["manager.is_master"] = "YES"
+        elif option == "--instance_name":
+            instance_name = value
         elif option == "-p":
             if not (value.isascii() and value.isdigit() and int(value) < 65536):
                 raise ConfError(f"-p {value}: a port is a number from 0 to 65535")
@@ -89,7 +95,7 @@ def parse_options(argv: Sequence[str]) -> Options:
             if not colon or not key.strip():
                 raise ConfError(f"-o {value}: write it as KEY:VALUE, such as -o logger.log_level:DEBUG")
             overrides[key.strip()] = text.strip()
-    return Options(file, ignore_missing, overrides, tuple(words))
+    return Options(file, ignore_missing, overrides, tuple(words), instance_name)
 
 
 def read_settings(
