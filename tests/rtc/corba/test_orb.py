@@ -8,7 +8,7 @@ from omniORB import CORBA
 
 from muros.rtc.codes import RtcError
 from muros.rtc.corba import Orb, current_orb, endpoint_arguments, start_orb
-from muros.rtc.corba._lost import describe, peer
+from muros.rtc.corba._lost import asked_again, describe, peer
 from muros.rtc.corba._stubs import RTC__POA, OpenRTM, OpenRTM__POA
 
 
@@ -94,6 +94,25 @@ def test_errors_of_calls_are_ours(orb: Orb) -> None:
     with pytest.raises(RtcError, match="port X failed: BAD_PARAM"), peer("port X"):
         raise CORBA.BAD_PARAM(0, CORBA.COMPLETED_NO)
     assert describe(CORBA.NO_PERMISSION(7, CORBA.COMPLETED_NO)) == "NO_PERMISSION (minor 0x7)"
+
+
+def test_a_line_that_was_cut_is_tried_once_more() -> None:
+    """As when another process listens at the address of one that has ended."""
+    answers: list[object] = [CORBA.COMM_FAILURE(0, CORBA.COMPLETED_MAYBE), "here"]
+
+    def call() -> object:
+        answer = answers.pop(0)
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    assert asked_again(call) == "here"
+    answers += [CORBA.COMM_FAILURE(0, CORBA.COMPLETED_MAYBE)] * 2
+    with pytest.raises(CORBA.COMM_FAILURE):
+        asked_again(call)
+    answers += [CORBA.TRANSIENT(0, CORBA.COMPLETED_NO), "not asked"]
+    with pytest.raises(CORBA.TRANSIENT):
+        asked_again(call)
 
 
 def test_repository_ids_of_a_component(orb: Orb) -> None:

@@ -16,6 +16,7 @@ from muros.rtc import Component, InPort, OutPort, Parameter
 from muros.rtc.codes import DataPortStatus
 from muros.rtc.corba import NameServer, Objects, Orb, RunningNameServer, set_up
 from muros.rtc.corba._conversion import texts_of, to_nv_list
+from muros.rtc.corba._lost import asked_again
 from muros.rtc.corba._stubs import RTC, OpenRTM, OpenRTM__POA, SDOPackage
 
 WAIT = 10.0
@@ -480,7 +481,9 @@ def start(orb: Orb, name_server: RunningNameServer) -> Iterator[Start]:
         )
         started.append(process)
         foreign = Foreign(process)
-        return foreign, NameServer(orb, name_server.address).resolve(f"{name}.rtc")
+        reference = NameServer(orb, name_server.address).resolve(f"{name}.rtc")
+        assert not asked_again(reference._non_existent)  # type: ignore[union-attr]  # its port may be an earlier one's
+        return foreign, reference
 
     yield run
     for process in started:

@@ -9,7 +9,7 @@ from omniORB import CORBA
 from muros.rtc.codes import ExecutionKind, LifeCycleState, ReturnCode, RtcError
 from muros.rtc.contexts import ContextProfile, ExecutionContext, Participant
 from muros.rtc.corba._conversion import from_return_code, texts_of
-from muros.rtc.corba._lost import peer, quick_answer
+from muros.rtc.corba._lost import asked_again, peer, quick_answer
 from muros.rtc.corba._naming import is_same
 from muros.rtc.corba._stubs import RTC
 
@@ -45,15 +45,16 @@ class ForeignComponent:
         if self._name is None:
             try:
                 with quick_answer():
-                    component = self.reference._narrow(RTC.RTObject)
-                    self._name = str(component.get_component_profile().instance_name) if component else ""
+                    component = asked_again(lambda: self.reference._narrow(RTC.RTObject))
+                    profile = asked_again(component.get_component_profile) if component else None
+                    self._name = str(profile.instance_name) if profile else ""
             except CORBA.Exception:
                 return ""
         return self._name
 
     def attach_context(self, context: ExecutionContext) -> int:
         with peer(self._who()):
-            self._flow = self.reference._narrow(RTC.DataFlowComponentAction)
+            self._flow = asked_again(lambda: self.reference._narrow(RTC.DataFlowComponentAction))
             self._component = self.reference._narrow(RTC.LightweightRTObject)
             if self._component is None:
                 raise RtcError("the object that is to be added to a context is no component")
@@ -141,7 +142,7 @@ class ForeignContext(ExecutionContext):
 
     def profile(self) -> ContextProfile:
         try:
-            found = self._service().get_profile()
+            found = asked_again(lambda: self._service().get_profile())
             return ContextProfile(
                 ExecutionKind(found.kind._v),
                 float(found.rate),
@@ -201,6 +202,6 @@ class ForeignContext(ExecutionContext):
 
     def _asked(self, operation: str, otherwise: object, *arguments: object) -> Any:
         try:
-            return getattr(self.reference, operation)(*arguments)
+            return asked_again(lambda: getattr(self.reference, operation)(*arguments))
         except CORBA.Exception:
             return otherwise

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Final
+from typing import Final, TypeVar
 
 import omniORB
 from omniORB import CORBA
 
 from muros.rtc.codes import PeerLostError, RtcError
 
-__all__ = ["LOST", "describe", "peer", "quick_answer"]
+__all__ = ["LOST", "asked_again", "describe", "peer", "quick_answer"]
+
+T = TypeVar("T")
 
 QUICK_SECONDS: Final = 2.0
 """Time that a peer has to say that it exists: tools wait for it."""
@@ -30,6 +32,18 @@ def peer(what: str) -> Iterator[None]:
         raise PeerLostError(f"{what} does not answer: {describe(error)}") from error
     except CORBA.Exception as error:
         raise RtcError(f"{what} failed: {describe(error)}") from error
+
+
+def asked_again(call: Callable[[], T]) -> T:
+    """What `call` gives, which may be asked twice, at the second try if need be.
+
+    A line to a process that has ended is noticed when it is used. Where another process listens at the same address
+    by then (it was started again, or got the port by chance), the first call fails and the next one reaches it.
+    """
+    try:
+        return call()
+    except CORBA.COMM_FAILURE:
+        return call()
 
 
 @contextmanager

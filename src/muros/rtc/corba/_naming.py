@@ -20,7 +20,7 @@ from omniORB import CORBA
 
 from muros.findings import Finding, Severity
 from muros.rtc.codes import PeerLostError, RtcError
-from muros.rtc.corba._lost import LOST, describe
+from muros.rtc.corba._lost import LOST, asked_again, describe
 from muros.rtc.corba._orb import Orb
 
 __all__ = ["Binding", "NameServer", "Names", "is_same", "lives", "server_address", "split_path"]
@@ -178,10 +178,7 @@ class NameServer:
         """The answer to a question that may be asked twice; a server that was restarted hears the second one."""
         who = f"name server {self.address}"
         try:
-            try:
-                return question(self._root())
-            except (CORBA.COMM_FAILURE, CORBA.OBJECT_NOT_EXIST):
-                return question(self._root())
+            return asked_again(lambda: question(self._root()))
         except LOST as error:
             raise PeerLostError(f"{who} does not answer: {describe(error)}") from error
         except CORBA.Exception as error:

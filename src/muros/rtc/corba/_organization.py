@@ -9,7 +9,7 @@ from omniORB import CORBA
 from muros.rtc.codes import LifeCycleState
 from muros.rtc.contexts import Participant
 from muros.rtc.corba._foreign import ForeignComponent
-from muros.rtc.corba._lost import peer
+from muros.rtc.corba._lost import asked_again, peer
 from muros.rtc.corba._port import ForeignPort
 from muros.rtc.corba._stubs import RTC, SDOPackage, SDOPackage__POA
 from muros.rtc.organization import Dependency, Member, Organization, OrganizationError
@@ -90,7 +90,9 @@ class OrganizationServant(SDOPackage__POA.Organization):  # type: ignore[misc]
 
     def _member(self, reference: Any) -> Member:
         try:
-            component = reference._narrow(RTC.RTObject) if reference is not None else None
+            component = (
+                asked_again(lambda: reference._narrow(RTC.RTObject)) if reference is not None else None
+            )
         except CORBA.Exception:
             component = None
         if component is None:

@@ -15,7 +15,7 @@ from muros.rtc.corba._conversion import (
     to_return_code,
 )
 from muros.rtc.corba._foreign import ForeignComponent
-from muros.rtc.corba._lost import peer, quick_answer
+from muros.rtc.corba._lost import asked_again, peer, quick_answer
 from muros.rtc.corba._naming import is_same
 from muros.rtc.corba._stubs import RTC, RTC__POA
 from muros.rtc.ports import Port
@@ -91,19 +91,20 @@ class ForeignPort:
 
     def notify_connect(self, profile: ConnectorProfile) -> tuple[ReturnCode, ConnectorProfile]:
         with peer(str(self)):
-            code, agreed = self.reference.notify_connect(self._objects.connector(profile))
+            asked = self._objects.connector(profile)
+            code, agreed = asked_again(lambda: self.reference.notify_connect(asked))
         # The ports are as they were asked for: they are not looked up a second time.
         properties = from_nv_list(agreed.properties)
         return from_return_code(code), replace(profile, name=agreed.name, properties=properties)
 
     def notify_disconnect(self, connector_id: str) -> ReturnCode:
         with peer(str(self)):
-            return from_return_code(self.reference.notify_disconnect(connector_id))
+            return from_return_code(asked_again(lambda: self.reference.notify_disconnect(connector_id)))
 
     def is_there(self) -> bool:
         try:
             with quick_answer():
-                return not self.reference._non_existent()
+                return not asked_again(self.reference._non_existent)
         except CORBA.Exception:
             return False
 
@@ -113,12 +114,12 @@ class ForeignPort:
     def full_name(self) -> str:
         """`<instance>.<port>`"""
         with peer(str(self)):
-            return str(self.reference.get_port_profile().name)
+            return str(asked_again(self.reference.get_port_profile).name)
 
     def profile(self) -> PortProfile:
         """As its process tells it."""
         with peer(str(self)):
-            found = self.reference.get_port_profile()
+            found = asked_again(self.reference.get_port_profile)
         return PortProfile(
             found.name,
             self,
