@@ -10,6 +10,7 @@ from muros import interfaces
 from muros.rosserial.constants import (
     ID_PARAMETER_REQUEST,
     ID_PUBLISHER,
+    ID_SERVICE_SERVER,
     ID_TIME,
     ID_TX_STOP,
     VERSION_GROOVY,
@@ -25,6 +26,7 @@ from muros.rosserial.server import (
     BoardReset,
     EndpointSetUp,
 )
+from muros.rosserial.server._endpoints import ServiceServer
 from muros.space import Durability, Qos, Reliability
 from tests.rosserial.scene import START, RosLib, Scene, string
 
@@ -127,6 +129,37 @@ def test_services_of_a_board_are_called_one_at_a_time() -> None:
         (True, "on"),
     ]
     assert not scene.told
+
+
+def test_who_calls_with_a_request_that_cannot_be_sent_is_told() -> None:
+    """As far as the world has a way to; in ROS 1 the call would never end."""
+    scene = Scene()
+    board = RosLib(scene)
+    _, requests = board.server("switch", "std_srvs/SetBool")
+    for half, info in board.infos:
+        info.buffer_size = 0 if half == ID_SERVICE_SERVER + 1 else 512
+    board.plug()
+    scene.step(400)
+    (server,) = scene.core.boards[0].roster.endpoints.values()
+    assert isinstance(server, ServiceServer)
+    assert server.server is not None
+    told: list[str] = []
+    server.server.fail = lambda request, text: told.append(text)  # type: ignore[method-assign]
+    call, _ = scene.client("/switch", "std_srvs/srv/SetBool")
+    scene.step(5)
+    call(data=True)
+    scene.step(5)
+    assert told == ["1 B do not fit the board's input buffer"]
+    for info in server.infos:
+        info.buffer_size = 512
+    scene.link.waiting = 100
+    while scene.core.boards[0].output.post(b"urgent"):
+        pass
+    call(data=True)
+    scene.step(5)
+    assert told[1:] == ["too much waits for the board's line"]
+    assert "call-unanswered" in scene.codes()
+    assert not board.taken(requests)
 
 
 def test_a_board_that_does_not_answer_delays_the_next_call_only() -> None:

@@ -259,11 +259,12 @@ class ServiceServer(Endpoint):
                 continue
             if taken is None:
                 return
-            request, body = taken
-            if self.fits(len(body), info.buffer_size) and board.output.post(
-                frame(info.topic_id, body, board.version)
-            ):
-                self._request = request
+            self._request, body = taken
+            if not self.fits(len(body), info.buffer_size):
+                self.server.fail(self._request, f"{len(body)} B do not fit the board's input buffer")
+            elif not board.output.post(frame(info.topic_id, body, board.version)):
+                self._unanswered("too much waits for the board's line")
+            else:
                 self._late = False
                 line = int((len(body) + info.buffer_size) * board.output.byte_us) // 1000
                 self.until = now + board.core.limits.answer + line
