@@ -12,7 +12,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Protocol, TypeAlias
 
 from muros.findings import Finding, Severity
@@ -103,6 +103,7 @@ class Link:
         self.refused = 0
         """Values that the buffer, or the other side, did not take."""
         self.closed = False
+        self._told: dict[str, tuple[int, Finding]] = {}
         self._setup: Final = setup
         self._codec: Final = setup.codec
         self._little: Final = setup.options.little
@@ -120,6 +121,7 @@ class Link:
         self._end()
         if self.offer is not None:
             self.offer.close()
+        self._tell_the_rest()
         self.tell_connector(ConnectorEvent.ON_DISCONNECT)
 
     def tell(self, event: DataEvent, sample: Sample) -> None:
@@ -148,12 +150,13 @@ class Link:
         self._listeners.tell(event, self.info)
 
     def overwrote(self) -> None:
-        """Count a value lost for a newer one. Told the first time, and each time it has become ten times as many."""
+        """Count a value lost for a newer one."""
         self.overwritten += 1
         if _is_power_of_ten(self.overwritten):
-            self._find(
+            self._tell_of(
                 "values-overwritten",
-                f"{self.overwritten} values of connection {self._label} overwritten before they were taken",
+                self.overwritten,
+                "overwritten before they were taken",
                 f"they come faster than they are taken, and the buffer holds {self.options.buffer.length}",
                 "read oftener, or connect with a longer buffer.length",
                 Severity.INFO,
@@ -176,9 +179,43 @@ class Link:
         return self.info.name or self.info.connector_id
 
     def _find(
-        self, code: str, what: str, why: str, remedy: str = "", severity: Severity = Severity.WARNING
+        self,
+        code: str,
+        what: str,
+        why: str,
+        remedy: str = "",
+        severity: Severity = Severity.WARNING,
+        new: int = 1,
+    ) -> Finding:
+        finding = Finding(code, self._setup.who, what, why, remedy, severity, self._label, new=new)
+        self._setup.report(finding)
+        return finding
+
+    def _tell_of(
+        self, code: str, total: int, what: str, why: str, remedy: str, severity: Severity = Severity.WARNING
     ) -> None:
-        self._setup.report(Finding(code, self._setup.who, what, why, remedy, severity, self._label))
+        """Values were lost, `total` so far. Told at the first, the tenth, the hundredth, ..., and at the end."""
+        before = self._told[code][0] if code in self._told else 0
+        finding = self._find(
+            code,
+            f"{{n}} value{{s}} of connection {self._label} {what}",
+            why,
+            remedy,
+            severity,
+            new=total - before,
+        )
+        self._told[code] = total, finding
+
+    def _tell_the_rest(self) -> None:
+        """Of the values lost since they were told of."""
+        totals = {
+            "values-overwritten": self.overwritten,
+            "values-refused": self.refused,
+            "malformed-data": self.malformed,
+        }
+        for code, (told, finding) in self._told.items():
+            if totals[code] > told:
+                self._setup.report(replace(finding, new=totals[code] - told))
 
     def _stamp(self, sample: Sample) -> None:
         try:
@@ -278,9 +315,10 @@ class PushSender(Link):
             return DataPortStatus.PORT_OK
         self.refused += 1
         if _is_power_of_ten(self.refused):
-            self._find(
+            self._tell_of(
                 "values-refused",
-                f"{self.refused} values of connection {self._label} not taken by the receiver",
+                self.refused,
+                "not taken by the receiver",
                 f"it answered {answer.name}",
                 "have it read oftener, or connect with a longer buffer or another full_policy",
             )
@@ -398,13 +436,15 @@ class InLink(Link):
             return sample.hand_out()
         except DataError as error:
             self.malformed += 1
-            self._find(
-                "malformed-data",
-                f"{self.malformed} values of connection {self._label} not readable",
-                str(error),
-                f"see that the sender writes {self._codec.repository_id}",
-                Severity.ERROR,
-            )
+            if _is_power_of_ten(self.malformed):
+                self._tell_of(
+                    "malformed-data",
+                    self.malformed,
+                    "not readable",
+                    str(error),
+                    f"see that the sender writes {self._codec.repository_id}",
+                    Severity.ERROR,
+                )
             raise
 
     def _end(self) -> None:
