@@ -2,6 +2,7 @@
 
 import os
 import signal
+from fnmatch import fnmatch
 from pathlib import Path
 from typing import Final
 
@@ -26,6 +27,8 @@ settings.load_profile("ci" if os.environ.get("CI") == "true" else "dev")
 
 REAL_TIME: Final = (
     "cli", "cyclone", "dds", "diagnostics", "examples", "rclc_space", "ros1", "rosserial", "rtps_net",
+    "rtc/cli", "rtc/corba", "rtc/examples", "rtc/manager", "rtc/shim", "rtc/*/test_over_corba.py",
+    "rtc/data/test_processes.py", "rtc/data/test_space_ros.py", "rtc/test_guide.py",
     "test_bench_*.py", "test_guide*.py", "test_parameters_guide.py",
 )  # fmt: skip
 """Tests that meet other programs in real time, by folder or file. A machine that stalls for seconds, or a peer that
@@ -36,6 +39,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Give the tests of REAL_TIME their second chance."""
     here = Path(__file__).parent
     for item in items:
-        top = item.path.relative_to(here).parts[0]
-        if any(Path(top).match(pattern) for pattern in REAL_TIME):
+        path = item.path.relative_to(here)
+        places = {path.as_posix(), *(folder.as_posix() for folder in path.parents)}
+        if any(fnmatch(place, pattern) for place in places for pattern in REAL_TIME):
             item.add_marker(pytest.mark.flaky(reruns=1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import pytest
@@ -219,6 +220,36 @@ def test_one_that_cannot_begin_leaves_nothing() -> None:
     assert component.trace == ["on_initialize", "on_finalize"]
     assert component.ports == ()
     assert not component.is_initialized
+
+
+def test_a_declaration_that_cannot_be_made_leaves_nothing() -> None:
+    class Doubled(Component):
+        first = InPort(LONG)
+        second = InPort(LONG, name="first")
+
+    component = Doubled()
+    component.configure("", {})
+    with pytest.raises(RtcError, match="Doubled0 has a port 'first' already"):
+        component.initialize([SynchronousExecutionContext()])
+    assert component.ports == ()
+    assert not component.is_initialized
+
+
+def test_one_that_ends_itself_is_deactivated_before_it_is_finalized() -> None:
+    class Ending(Traced):
+        ended = threading.Event()
+
+        def on_execute(self, context: int) -> None:
+            super().on_execute(context)
+            assert self.exit() is OK
+
+    component = Ending()
+    component.listeners.add(ComponentEvent.FINALIZED, component.ended.set)
+    alive(component)
+    activate(component)
+    tick(component)
+    assert component.ended.wait(20)
+    assert component.trace[-4:] == ["on_execute 0", "on_deactivated 0", "on_finalize", "on_shutdown 0"]
 
 
 def test_contexts_of_others_have_handles_of_their_own() -> None:

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, cast, runtime_
 from muros.rtc.actions import ActionPoint, ComponentEvent, join_names
 from muros.rtc.codes import LifeCycleState, ReturnCode, RtcError
 from muros.rtc.configuration import Configuration
+from muros.rtc.contexts import inside_callback, make_contexts
 from muros.rtc.listeners import Listeners
 from muros.rtc.participation import Participation
 from muros.rtc.ports import Port
@@ -289,17 +290,21 @@ class Component:
         """Make what is declared, run `on_initialize`, start the contexts it owns.
 
         `contexts`: those it is to own; None makes those that its properties ask for. What `on_initialize` answers
-        is returned; if it is not RTC_OK, `on_finalize` has run and nothing is left.
+        is returned; if it is not RTC_OK, `on_finalize` has run and nothing is left. RtcError where what is declared
+        or asked for cannot be; nothing is left then, either.
         """
         if contexts is None:
-            from muros.rtc.contexts import make_contexts
-
             contexts = make_contexts(self.properties, reporter=self.reporter)
         with self._lock:
             self._owned = list(contexts)
             self._alive = True
-        for declaration in self.declarations():
-            declaration.make(self)
+        try:
+            for declaration in self.declarations():
+                declaration.make(self)
+        except BaseException:
+            self._alive = False
+            self._take_apart()
+            raise
         code = self.participation.on_initialize()
         if code is not OK:
             self.participation.on_finalize()
@@ -316,12 +321,19 @@ class Component:
     def exit(self) -> ReturnCode:
         """End it: out of the active or error state, `on_finalize`, contexts and ports taken apart.
 
-        Returns RTC_ERROR where `on_finalize` failed, PRECONDITION_NOT_MET where it is not running.
+        Returns RTC_ERROR where `on_finalize` failed, PRECONDITION_NOT_MET where it is not running. From inside an
+        action of any component, RTC_OK: it ends in a thread of its own, as the action has to return first.
         """
         with self._lock:
             if not self._alive:
                 return ReturnCode.PRECONDITION_NOT_MET
             self._alive = False
+        if inside_callback():
+            threading.Thread(target=self._end, name=f"end of {self.instance_name}").start()
+            return OK
+        return self._end()
+
+    def _end(self) -> ReturnCode:
         for context in (*self._owned, *self._participating.values()):
             state = context.get_component_state(self.participation)
             if state is LifeCycleState.ACTIVE_STATE:
