@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from muros.interfaces import action, service
-from muros.rclc import Context, ParameterClient, ParameterError, Rules
+from muros.rclc import Context, Executor, ParameterClient, ParameterError, Rules
 from muros.rclc.host.checks import WrongTypeError
 from muros.rclc.host.sharing import Mailbox, Seat
 from muros.rclc.memory import REFUSED
@@ -194,6 +194,30 @@ def test_rules_for_nothing_leave_nothing_behind(stage: Stage) -> None:
     with pytest.raises(WrongTypeError, match="memory is Rules"):
         node.client(SetBool, "a", memory={"message": 5})  # type: ignore[arg-type]
     assert not node.context.handles
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [(5,), ({"a": "b"},), ({"a": 1.5},), ({"a": -1},), ({}, None), ({}, 20, "5"), ({}, 20, 5, -5)],
+)
+def test_what_are_no_rules(arguments: Any) -> None:
+    with pytest.raises(ValueError, match=r"no size|are a dict") as caught:
+        Rules(*arguments)
+    assert caught.value.code == 11  # type: ignore[attr-defined]
+
+
+def test_sizes_are_those_of_rules_that_fit() -> None:
+    rules = Rules({"date": 5})
+    for say in (rules.capacities, rules.size, rules.static_size, rules.longest):
+        with pytest.raises(ValueError, match="std_msgs/msg/String takes no string or sequence 'date'"):
+            say(String)
+
+
+def test_a_condition_is_a_function() -> None:
+    context = Context("local:")
+    with pytest.raises(TypeError, match="the condition of spin_until is a function, not True"):
+        Executor(context).spin_until(True, 0.1)  # type: ignore[arg-type]
+    context.close()
 
 
 def test_with_threads_the_queue_is_that_of_the_handle(url: str) -> None:

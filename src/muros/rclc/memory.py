@@ -72,8 +72,11 @@ class Rules:
         numbers: int = 5,
     ) -> None:
         self.rules = {} if rules is None else rules
-        if min(strings, messages, numbers) < 0 or min(list(self.rules.values()) + [0]) < 0:
-            raise RulesError("rules are sizes, 0 or more")
+        if not isinstance(self.rules, dict):
+            raise RulesError("rules are a dict of paths and sizes, not %r" % (rules,))
+        for size in [strings, messages, numbers] + list(self.rules.values()):
+            if not isinstance(size, int) or size < 0:
+                raise RulesError("%r is no size: rules are sizes, 0 or more" % (size,))
         self.strings = strings or 20
         self.messages = messages or 5
         self.numbers = numbers or 5

@@ -358,6 +358,7 @@ class Executor(executor_.Executor):
         return True
 
     def _until(self, condition: Callable[[], object], timeout: float | None) -> Steps[bool]:
+        be_callable(condition, "the condition of spin_until")
         end = self.context.clock() + _patience(timeout)
         self.due = None
         while not condition():

@@ -2,7 +2,7 @@
 
 The sizes are those of the C library for boards, so that the figures of one hold for the other: what strings and
 sequences point to, in C structures of a machine whose pointers have ``word`` bytes. The functions are methods of
-`memory.Rules`, on hosts only, where boards are planned.
+`memory.Rules`, on hosts only, where boards are planned. They raise RulesError for a rule that is for no member.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from muros.rclc.arena import Arena
-from muros.rclc.memory_plan import Walker, capacity
+from muros.rclc.memory_plan import Walker, capacity, divide
 
 if TYPE_CHECKING:
     from muros.rclc.memory import Rules
@@ -37,7 +37,7 @@ class Member(NamedTuple):
 def capacities(self: Rules, kind: Any) -> dict[str, int]:
     """The capacity of each string and sequence of a type, by its path."""
     found: dict[str, int] = {}
-    walker = Walker(kind)
+    walker = _walk(self, kind)
     for _ in walker:
         if walker.path:
             found[walker.path] = capacity(self, walker.path, walker.form)
@@ -46,17 +46,17 @@ def capacities(self: Rules, kind: Any) -> dict[str, int]:
 
 def size(self: Rules, kind: Any, word: int = 8) -> int:
     """The bytes that all strings and sequences of a message take together."""
-    return _total(_members(self, Walker(kind)), word, 1)
+    return _total(_members(self, _walk(self, kind)), word, 1)
 
 
 def static_size(self: Rules, kind: Any, word: int = 8) -> int:
     """The bytes of a buffer out of which all of them can be carved, each aligned to 4 bytes."""
-    return _total(_members(self, Walker(kind)), word, _ALIGN)
+    return _total(_members(self, _walk(self, kind)), word, _ALIGN)
 
 
 def longest(self: Rules, kind: Any) -> int:
     """The bytes of the longest body that keeps to the rules; ``Session(largest=...)`` needs 8 more."""
-    return _end(_members(self, Walker(kind)), 0)
+    return _end(_members(self, _walk(self, kind)), 0)
 
 
 def carve(self: Rules, kind: Any, memory: Arena | bytearray, word: int = 8) -> dict[str, list[memoryview]]:
@@ -67,8 +67,14 @@ def carve(self: Rules, kind: Any, memory: Arena | bytearray, word: int = 8) -> d
     if isinstance(memory, bytearray):
         memory = Arena(memory)
     found: dict[str, list[memoryview]] = {}
-    _carve(_members(self, Walker(kind)), memory, word, found)
+    _carve(_members(self, _walk(self, kind)), memory, word, found)
     return found
+
+
+def _walk(rules: Rules, kind: Any) -> Walker:
+    """A way through the type. RulesError for a rule that is for none of its members."""
+    divide(rules, kind.TYPE, [kind])
+    return Walker(kind)
 
 
 def _members(rules: Rules, walker: Walker) -> list[Member]:
