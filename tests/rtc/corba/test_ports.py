@@ -40,8 +40,8 @@ class Sink(Component):
 class Pair:
     """A source and a sink of one process, known to the ORB, and their references."""
 
-    def __init__(self, objects: Objects) -> None:
-        self.findings: list[Finding] = []
+    def __init__(self, objects: Objects, findings: list[Finding]) -> None:
+        self.findings = findings
         self.objects = objects
         self.source, self.sink = Source(), Sink()
         for component, name in ((self.source, "Source0"), (self.sink, "Sink0")):
@@ -61,7 +61,8 @@ class Pair:
 @pytest.fixture
 def pair(orb: Orb) -> Iterator[Pair]:
     before = set(orb.servants)
-    one = Pair(set_up(orb))
+    findings: list[Finding] = []
+    one = Pair(set_up(orb, report=findings.append), findings)
     yield one
     one.close()
     assert set(orb.servants) == before
@@ -164,6 +165,7 @@ def test_requests_that_cannot_be_are_answered(pair: Pair) -> None:
     assert pair.out.connect(request(pair.out, pair.inp))[0] == RTC.BAD_PARAMETER
     assert pair.out.connect(RTC.ConnectorProfile("nil", "", [pair.out, None], []))[0] == RTC.BAD_PARAMETER
     assert pair.out.notify_connect(RTC.ConnectorProfile("nil", "x", [None], []))[0] == RTC.BAD_PARAMETER
+    assert [finding.code for finding in pair.findings[-2:]] == ["request-refused"] * 2
     assert pair.out.connect(request(pair.out, pair.out, **PUSH))[0] == RTC.BAD_PARAMETER
     assert pair.out.connect(request(pair.out, pair.in_blob, **PUSH))[0] != RTC.RTC_OK
     assert pair.out.notify_disconnect("nobody") == RTC.BAD_PARAMETER

@@ -41,10 +41,12 @@ def default_maker(descriptor: Any) -> Callable[[], Any]:
 
 
 def kind_of(descriptor: Any) -> int:
+    """The number of a descriptor's kind."""
     return descriptor if isinstance(descriptor, int) else int(descriptor[0])
 
 
 def name_of(descriptor: Any) -> str:
+    """What a type is called in tracebacks of its code."""
     return str(descriptor[3]) if kind_of(descriptor) == kinds.tv_struct else str(descriptor)[:60]
 
 
@@ -56,6 +58,7 @@ def resolved(descriptor: Any) -> Any:
 
 
 def members_of(descriptor: Any) -> Iterator[tuple[str, Any]]:
+    """The members of a structure: attribute and descriptor. Unwritable where one cannot be an attribute."""
     for name, kind in zip(descriptor[4::2], descriptor[5::2], strict=True):
         if not name.isidentifier() or iskeyword(name):
             raise Unwritable(f"member {name}")

@@ -56,7 +56,7 @@ _NUMPY: Final = {
     "h": "i2", "H": "u2", "i": "i4", "I": "u4", "q": "i8", "Q": "u8", "f": "f4", "d": "f8", "?": "b1",
 }  # fmt: skip
 _IS_WIDTH: Final = {
-    code: code != "?" and array(code).itemsize == int(name[1]) for code, name in _NUMPY.items() if code != "?"
+    code: array(code).itemsize == int(name[1]) for code, name in _NUMPY.items() if code != "?"
 }
 
 

@@ -2,7 +2,7 @@
 
 A type is walked member by member. Members of fixed size are gathered in *runs* that one `struct.Struct` packs and
 unpacks at once, with the padding between them written into its format. What is known of the position at every point
-is a `_Place`: position = `offset` modulo `modulus`. Where that is not enough to align the next member (after a text,
+is a `Place`: position = `offset` modulo `modulus`. Where that is not enough to align the next member (after a text,
 say), code is written that aligns by the real position, `pos`, which is only kept in encoders that need it.
 
 Sequences of structures whose elements all have the same layout are packed and unpacked without a loop of their own

@@ -89,7 +89,8 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
     def attach_context(self, exec_context: Any) -> int:
         try:
             return self.component.attach_context(self._objects.context_behind(exec_context))
-        except RtcError:
+        except RtcError as error:
+            self._objects.refused(self.component.instance_name, "attach_context refused", error)
             return -1
 
     def detach_context(self, exec_handle: int) -> Any:

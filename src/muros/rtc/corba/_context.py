@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Final
 
-from muros.rtc.codes import RtcError
+from muros.rtc.codes import ReturnCode, RtcError
 from muros.rtc.contexts import ExecutionContext, Participant
 from muros.rtc.corba._conversion import to_nv_list, to_return_code
 from muros.rtc.corba._stubs import RTC, RTC__POA, OpenRTM__POA
@@ -73,10 +74,11 @@ class _Operations:
             to_nv_list(profile.properties),
         )
 
-    def _with(self, component: Any, operation: Any) -> Any:
+    def _with(self, component: Any, operation: Callable[[Participant], ReturnCode]) -> Any:
         try:
-            participant: Participant = self._objects.participant_behind(component)
-        except RtcError:
+            participant = self._objects.participant_behind(component)
+        except RtcError as error:
+            self._objects.refused(str(self.context), f"{operation.__name__} refused", error)
             return RTC.BAD_PARAMETER
         return to_return_code(operation(participant))
 

@@ -18,8 +18,7 @@ T = TypeVar("T")
 QUICK_SECONDS: Final = 2.0
 """Time that a peer has to say that it exists: tools wait for it."""
 
-
-LOST = (CORBA.TRANSIENT, CORBA.COMM_FAILURE, CORBA.OBJECT_NOT_EXIST, CORBA.TIMEOUT, CORBA.INV_OBJREF)
+LOST: Final = (CORBA.TRANSIENT, CORBA.COMM_FAILURE, CORBA.OBJECT_NOT_EXIST, CORBA.TIMEOUT, CORBA.INV_OBJREF)
 """The other side has ended, the line is cut, or it took too long."""
 
 

@@ -1,9 +1,10 @@
 """What this process offers to others, and what it knows of theirs: the model's objects and their references.
 
-Each component, port and context of the model that others ask for gets a servant, once; `reference_of` gives the
-reference to it, and `port_behind`, `participant_behind` and `context_behind` go the other way: to the model's own
-object where the reference leads into this process, else to one that stands for it (`ForeignPort` ...). So a port that
-is connected with one of the same process is called directly, and two references to the same object are one peer.
+Each component, port and context of the model that others ask for gets a servant, once; `component`, `port` and
+`context` give the reference to it, and `port_behind`, `participant_behind` and `context_behind` go the other way: to
+the model's own object where the reference leads into this process, else to one that stands for it (`ForeignPort` ...).
+So a port that is connected with one of the same process is called directly, and two references to the same object are
+one peer.
 
 `offer` makes a component known; `withdraw` takes it away with all that belongs to it, so that nothing stays behind.
 """
@@ -39,7 +40,7 @@ class Objects:
 
     def __init__(self, orb: Orb, *, report: Callable[[Finding], object] = lambda finding: None) -> None:
         self.orb: Final = orb
-        self.report: Final = report
+        self._report = report
         self._lock = threading.RLock()
         self._servants: dict[object, Any] = {}
         """By the model's object."""
@@ -195,6 +196,10 @@ class Objects:
 
         servant = self._local(reference, "execution context")
         return servant.context if isinstance(servant, ContextServant) else ForeignContext(reference, self)
+
+    def refused(self, who: str, what: str, error: RtcError) -> None:
+        """A request of somebody's made no sense: a finding."""
+        self._report(Finding("request-refused", who, what, str(error), subject=what))
 
     # ---- inside
 

@@ -47,16 +47,16 @@ class PortServant(RTC__POA.PortService):  # type: ignore[misc]
     def connect(self, connector_profile: Any) -> tuple[Any, Any]:
         try:
             asked = self._objects.connector_behind(connector_profile)
-        except RtcError:
-            return RTC.BAD_PARAMETER, connector_profile
+        except RtcError as error:
+            return self._refused(connector_profile, error)
         code, agreed = self.port.connect(asked)
         return to_return_code(code), self._objects.connector(agreed)
 
     def notify_connect(self, connector_profile: Any) -> tuple[Any, Any]:
         try:
             asked = self._objects.connector_behind(connector_profile)
-        except RtcError:
-            return RTC.BAD_PARAMETER, connector_profile
+        except RtcError as error:
+            return self._refused(connector_profile, error)
         code, agreed = self.port.notify_connect(asked)
         return to_return_code(code), self._objects.connector(agreed)
 
@@ -68,6 +68,10 @@ class PortServant(RTC__POA.PortService):  # type: ignore[misc]
 
     def notify_disconnect(self, connector_id: str) -> Any:
         return to_return_code(self.port.notify_disconnect(connector_id))
+
+    def _refused(self, profile: Any, error: RtcError) -> tuple[Any, Any]:
+        self._objects.refused(f"port {self.port.full_name}", f"connection {profile.name} refused", error)
+        return RTC.BAD_PARAMETER, profile
 
 
 class ForeignPort:
