@@ -44,6 +44,7 @@ from OpenRTM_aist._data_ports import (
     OnWriteConvert,
     OutPort,
     OutPortBase,
+    RingBuffer,
 )
 from OpenRTM_aist._manager import Manager
 from OpenRTM_aist._ports import PortBase, PortConnectListenerType, PortConnectRetListenerType
@@ -125,6 +126,7 @@ __all__ = [
     "PreComponentActionListenerType",
     "Properties",
     "RTObject_impl",
+    "RingBuffer",
     "StaticFSM",
     "Time",
     "TimeValue",

@@ -367,6 +367,7 @@ class RTObject_impl:  # noqa: N801
     def addPort(self, port: PortBase) -> bool:
         """Add a port of any kind."""
         self._behind.add_port(port.port)
+        port.port.configuration = {**port.wishes, **port.port.configuration}
         return True
 
     def registerInPort(self, name: str, inport: InPort) -> bool:

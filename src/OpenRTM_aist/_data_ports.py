@@ -30,6 +30,7 @@ __all__ = [
     "OnWriteConvert",
     "OutPort",
     "OutPortBase",
+    "RingBuffer",
 ]
 
 
@@ -54,6 +55,10 @@ class ConnectorDataListenerType:
     def event(number: int) -> DataEvent:
         return tuple(DataEvent)[number]
 
+    @staticmethod
+    def toString(number: int) -> str:
+        return tuple(DataEvent)[number].value
+
 
 class ConnectorListenerType:
     """Moments at which there is no value."""
@@ -72,6 +77,10 @@ class ConnectorListenerType:
     @staticmethod
     def event(number: int) -> ConnectorEvent:
         return tuple(ConnectorEvent)[number]
+
+    @staticmethod
+    def toString(number: int) -> str:
+        return tuple(ConnectorEvent)[number].value
 
 
 class ConnectorListenerStatus:
@@ -139,6 +148,13 @@ class ConnectorListener:
 
     def __call__(self, info: ConnectorInfo) -> Any:
         return ConnectorListenerStatus.NO_CHANGE
+
+
+class RingBuffer:
+    """How many values wait at a port's connections, where they do not say otherwise; for components of version 1.0."""
+
+    def __init__(self, length: int = 8) -> None:
+        self.length = length
 
 
 class OnRead:
@@ -216,7 +232,7 @@ class _DataPort(PortBase):
 class InPort(_DataPort):
     """An InPort for values like `value`; `read` returns them.
 
-    `buffer` and what follows are for components of version 0.4; the connections' own properties count.
+    `buffer` may be a `RingBuffer`. What follows was for components of version 0.4: the connections' properties count.
     """
 
     kind: ClassVar[str] = "inport"
@@ -232,6 +248,7 @@ class InPort(_DataPort):
         write_timeout: int = 0,
     ) -> None:
         super().__init__(DataInPort(name, data_type_of(type(value)), initial=value))
+        self.wishes = _wishes(buffer)
         self._value = value
 
     def isNew(self, names: Any = None) -> bool:
@@ -278,6 +295,7 @@ class OutPort(_DataPort):
 
     def __init__(self, name: str, value: Any, buffer: Any = None) -> None:
         super().__init__(DataOutPort(name, data_type_of(type(value))))
+        self.wishes = _wishes(buffer)
         self._value = value
         self.port.value = value
 
@@ -297,6 +315,10 @@ class OutPort(_DataPort):
 
     def setOnWriteConvert(self, on_wconvert: Callable[[Any], Any]) -> None:
         self.port.on_write_convert = on_wconvert
+
+
+def _wishes(buffer: Any) -> dict[str, str]:
+    return {"buffer.length": str(buffer.length)} if isinstance(buffer, RingBuffer) else {}
 
 
 InPortBase = InPort

@@ -45,6 +45,8 @@ class PortBase:
 
     def __init__(self, port: Port) -> None:
         self.port = port
+        self.wishes: dict[str, str] = {}
+        """What holds where neither rtc.conf nor the connection says otherwise."""
         self._listeners: dict[tuple[int, Any], Callable[..., Any]] = {}
 
     def name(self) -> str:

@@ -165,6 +165,21 @@ def test_a_port_that_says_no_leaves_nothing_behind(which: int, step: str) -> Non
     assert ports[0].connect(wanted(*ports))[0] is OK
 
 
+@pytest.mark.parametrize("hook", ["prepare", "subscribe_interfaces", "unsubscribe_interfaces"])
+def test_what_a_kind_of_port_raises_is_told(hook: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    a, b = Talker("a"), Talker("b")
+
+    def fail(*arguments: object) -> None:
+        raise OSError("no more handles")
+
+    monkeypatch.setattr(b, hook, fail)
+    code, agreed = a.connect(wanted(a, b))
+    assert code is (OK if hook == "unsubscribe_interfaces" else ERROR)
+    assert a.disconnect(agreed.connector_id) is (OK if hook == "unsubscribe_interfaces" else BAD)
+    assert a.connectors == b.connectors == ()
+    assert "OSError: no more handles" in [f.why for f in b.findings]
+
+
 def test_the_same_port_twice_is_refused() -> None:
     a, b = Talker("a"), Talker("b")
     assert a.connect(wanted(a, a))[0] is BAD
@@ -239,6 +254,23 @@ class TestOtherProcesses:
             assert a.connect(replace(wanted(*ports), connector_id="mine"))[0] is ERROR
             assert peer.asked == ["connect", "disconnect mine"]
             assert not a.connectors
+
+    def test_a_first_port_that_fails_behind_ours_leaves_nothing_here(self) -> None:
+        a = Talker("a")
+
+        class CallsOn(Peer):
+            __hash__ = object.__hash__
+
+            def notify_connect(self, profile: ConnectorProfile) -> tuple[ReturnCode, ConnectorProfile]:
+                code, profile = a.notify_connect(profile)
+                assert code is OK
+                return ERROR, profile
+
+        peer = CallsOn()
+        assert a.connect(replace(wanted(peer, a), connector_id="mine"))[0] is ERROR
+        assert peer.asked == ["disconnect mine", "disconnect mine"]
+        assert a.connectors == ()
+        assert a.log[-1] == "a unsubscribes"
 
     def test_a_peer_that_has_no_room_has_not_begun(self) -> None:
         a, peer = Talker("a"), Peer(code=NO)
@@ -323,6 +355,17 @@ def test_listeners_hear_the_steps_in_order() -> None:
         ("ON_DISCONNECTED", OK),
     ]
     assert [f.code for f in a.findings] == ["listener-failed"]
+
+
+def test_a_plain_port_agrees_to_everything() -> None:
+    a, b = Port("a", PortType.SERVICE), Port("b", PortType.SERVICE)
+    a.configuration = {"connection_limit": "-1"}
+    code, agreed = a.connect(wanted(a, b))
+    assert (code, dict(agreed.properties)) == (OK, {})
+    a.activate()
+    a.deactivate()
+    assert a.disconnect_all() is OK
+    assert b.connector(agreed.connector_id) is None
 
 
 def test_its_profile_says_what_it_is() -> None:

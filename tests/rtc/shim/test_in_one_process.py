@@ -165,6 +165,24 @@ def test_values_go_through_ports(manager: rtm.Manager) -> None:
     assert rtm.DataPortStatus.toString(ports.out.getStatus(0)) == "PORT_OK"
 
 
+def test_a_buffer_of_the_ports_own(manager: rtm.Manager) -> None:
+    class Old(Ports):
+        def onInitialize(self) -> Any:  # noqa: N802
+            self.out = rtm.OutPort("out", self.number, rtm.RingBuffer(4))
+            self.into = rtm.InPort("in", self.number, rtm.RingBuffer(2))
+            self.addPort(self.out)
+            self.addPort(self.into)
+            return RTC.RTC_OK
+
+    old = make(manager, Old)
+    old.wire()
+    for old.number.data in (1, 2, 3):
+        old.out.write()
+    assert [old.into.read().data for _ in range(2)] == [2, 3]
+    assert rtm.ConnectorDataListenerType.toString(0) == "ON_BUFFER_WRITE"
+    assert rtm.ConnectorListenerType.toString(5) == "ON_CONNECT"
+
+
 def test_callbacks_of_ports(manager: rtm.Manager) -> None:
     ports = make(manager, Ports)
     seen: list[Any] = []
@@ -360,6 +378,71 @@ def test_services(manager: rtm.Manager) -> None:
     provider.consumer.releaseObject()
     assert not provider.consumer.setObject(None)
     assert rtm.CorbaConsumer(consumer=provider.consumer).interface is RTC.DataPushService
+
+
+def test_state_machines(manager: rtm.Manager) -> None:
+    fsm = rtm.StaticFSM
+    heard: list[Any] = []
+
+    class Box:
+        def __init__(self, begin: int = 0) -> None:
+            self.count = begin
+
+    @fsm.FSM_TOPSTATE
+    class Top(fsm.Link):
+        def onInit(self) -> Any:  # noqa: N802
+            self.set_state(fsm.State(Working))
+            return RTC.RTC_OK
+
+        def step(self, value: Any) -> None: ...
+
+        def pause(self) -> None: ...
+
+    @fsm.DEEPHISTORY
+    @fsm.DATA_TYPE(Box)
+    @fsm.FSM_SUBSTATE(Top)
+    class Working(fsm.Link):
+        def onEntry(self) -> Any:  # noqa: N802
+            heard.append(self.rtComponent().getInstanceName())
+            return RTC.RTC_OK
+
+        def step(self, value: Any) -> None:
+            self.data(Working).count += value.data
+            if self.data().count == 1:
+                self.dispatch(fsm.Event(Top.step, value))
+
+        def pause(self) -> None:
+            self.setState(fsm.State(Paused))
+
+    @fsm.FSM_SUBSTATE(Top)
+    class Paused(fsm.Link):
+        def pause(self) -> None:
+            self.setStateHistory(fsm.State(Working, 5))
+
+    class Worker(rtm.DataFlowComponentBase):
+        def onInitialize(self) -> Any:  # noqa: N802
+            self.fsm = fsm.Machine(Top, self)
+            self.event = rtm.EventInPort("event", self.fsm)
+            self.event.bindEvent("step", Top.step, RTC.TimedLong(RTC.Time(0, 0), 0))
+            self.event.bindEvent("pause", Top.pause)
+            self.out = rtm.OutPort("out", RTC.TimedLong(RTC.Time(0, 0), 1))
+            self.addInPort("event", self.event)
+            self.addOutPort("out", self.out)
+            return RTC.RTC_OK
+
+    worker = make(manager, Worker)
+    assert worker.fsm.getComp() is worker
+    assert rtm.CORBA_RTCUtil.connect("step", None, *worker.get_ports()) == RTC.RTC_OK
+    assert worker.out.write()
+    assert worker.fsm.run_event() == 1
+    assert worker.fsm.data(Working).count == 2, "once by the port, once by itself"
+    assert worker.fsm.dispatch(fsm.Event("pause"))
+    assert worker.fsm.current is Paused
+    assert worker.fsm.dispatch("pause")
+    assert worker.fsm.data(Working).count == 5
+    assert heard == ["Worker0", "Worker0"]
+    service = worker.getObjRef().get_sdo_service("IDL:omg.org/RTC/ExtendedFsmService:1.0")
+    assert service._narrow(RTC.ExtendedFsmService).get_current_state() == "Working"
 
 
 def test_the_manager_tells_of_itself(manager: rtm.Manager) -> None:
