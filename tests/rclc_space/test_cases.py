@@ -18,7 +18,6 @@ from muros.client import Qos, Udp, discover, ping
 from muros.client.raw import Raw
 from muros.links import DiscoveryLink, UdpLink
 from muros.rclc import Context, Executor, GuardCondition, InvalidNameError, Node, Streamer
-from muros.space import open_space
 from tests.client.agent_thread import RunningAgent
 from tests.dds.domains import free_domain
 from tests.rclc_space.ways import PATIENCE, Stage, ThroughAgent
@@ -96,7 +95,7 @@ def test_e1_init(stage: Stage) -> None:
         transport = stage.way.transport()
         refused(lambda: Context(Udp))
         refused(lambda: Context(transport, 0))
-        refused(lambda: Context(transport, space=open_space("local:")))
+        refused(lambda: Context(transport, space="local:"))
     else:
         refused(lambda: Context("nothing:"))
         refused(lambda: Context("local:", 5))
@@ -460,7 +459,7 @@ def test_r19_init_and_shutdown_again(stage: Stage) -> None:
 
 def test_r20_autodiscover(stage: Stage) -> None:
     if stage.way.direct:
-        assert stage.way.open().ping(0.0), "there is nobody to look for"
+        assert stage.run(stage.way.open()).ping(0.0), "there is nobody to look for"
         return
     data, door = UdpLink(0, "127.0.0.1"), DiscoveryLink(0)
     agent = RunningAgent(data, door)
