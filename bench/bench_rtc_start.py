@@ -32,7 +32,7 @@ def memory():
 stages = {"interpreter MB": memory()}
 from muros.rtc import Component
 from muros.rtc.manager import Manager, parse_options, read_settings
-import muros.rtc.corba._manager
+import muros.rtc.corba._world
 stages["import ms"], stages["import MB"] = 1e3 * (time.perf_counter() - begin), memory()
 class Bench(Component):
     category = "bench"

@@ -12,7 +12,7 @@ import pytest
 from omniORB import any
 
 from muros.rtc.corba import Orb, RunningNameServer
-from muros.rtc.corba._manager import CorbaWorld
+from muros.rtc.corba._world import CorbaWorld
 from muros.rtc.manager._defaults import DEFAULTS
 from muros.rtc.properties import Properties
 from muros.rtc.reports import Reporter

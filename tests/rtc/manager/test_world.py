@@ -15,8 +15,9 @@ import pytest
 
 from muros.rtc.codes import PeerLostError, ReturnCode, RtcError
 from muros.rtc.corba import Orb, RunningNameServer
-from muros.rtc.corba._manager import CorbaWorld, PeerManager
+from muros.rtc.corba._manager import PeerManager
 from muros.rtc.corba._naming import NameServer
+from muros.rtc.corba._world import CorbaWorld
 from muros.rtc.manager._defaults import DEFAULTS
 from muros.rtc.properties import Properties
 from muros.rtc.reports import Reporter
@@ -262,7 +263,7 @@ def test_ports_meet_in_a_topic(managers: Managers, world: CorbaWorld, first: str
         for name in (first, second)
     }
     managers.wait_for(processes["Listener"], "heard 7")
-    server = world._names.servers[0]
+    server = world._registration.servers[0]
     names = [binding.name for binding in server.list("dataports.port_cxt/news.topic_cxt")]
     assert sorted(names) == ["Listener0.values", "Talker0.out"]
     processes["Talker"].send_signal(signal.SIGTERM)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -170,15 +171,15 @@ class Manager:
             self._every("naming.update.interval", self._topics.update)
         self.timer.every(1.0, self.reporter.tick)
         for name in self.settings.words("manager.modules.preload"):
-            self._try("preload", name, lambda name=name: self.load_module(name))  # type: ignore[misc]
+            self._try("preload", name, partial(self.load_module, name))
         if init is not None:
             init(self)
         for request in self.settings.words("manager.components.precreate"):
-            self._try("precreate", request, lambda request=request: self.create(request))  # type: ignore[misc]
+            self._try("precreate", request, partial(self.create, request))
         for request in self.settings.words("manager.components.preconnect"):
             self._preconnect(request)
         for name in self.settings.words("manager.components.preactivation"):
-            self._try("preactivation", name, lambda name=name: self.activate(name))  # type: ignore[misc]
+            self._try("preactivation", name, partial(self.activate, name))
         self._shut_down_when_empty()
         self.log.logger.info("manager %s is up", self.name)
 
@@ -504,6 +505,6 @@ def _not_started() -> RtcError:
 
 
 def _corba_world(manager: Manager) -> World:
-    from muros.rtc.corba._manager import CorbaWorld
+    from muros.rtc.corba._world import CorbaWorld
 
     return CorbaWorld(manager.settings, manager.reporter)

@@ -1,0 +1,219 @@
+"""The world that a manager lives in, over CORBA: the process's ORB, its names, other managers and components."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from muros.rtc.codes import PeerLostError, RtcError
+from muros.rtc.corba._conversion import to_nv_list
+from muros.rtc.corba._lost import peer
+from muros.rtc.corba._manager import ManagerServant, PeerManager
+from muros.rtc.corba._naming import NameServer, is_same
+from muros.rtc.corba._orb import Orb, current_orb, start_orb
+from muros.rtc.corba._organization import ForeignMember
+from muros.rtc.corba._registration import Registration
+from muros.rtc.corba._setup import set_up
+from muros.rtc.corba._stubs import RTC, RTM
+from muros.rtc.properties import Properties
+from muros.rtc.reports import Reporter
+
+if TYPE_CHECKING:
+    from muros.rtc.component import Component
+    from muros.rtc.manager import Manager
+    from muros.rtc.ports import Port
+    from muros.rtc.profiles import PeerPort
+
+__all__ = ["CorbaWorld"]
+
+DEFAULT_KEY: Final = "manager"
+"""The object key of a manager whose address has none."""
+
+MASTER_PORT: Final = 2810
+"""TCP port of a master manager whose address has none."""
+
+
+class CorbaWorld:
+    """The ORB of the process, and what is reached through it: `muros.rtc.manager`'s `World`."""
+
+    def __init__(self, settings: Properties, reporter: Reporter) -> None:
+        self._owns_orb = not _runs()
+        self.orb: Final[Orb] = start_orb(
+            _endpoints(settings),
+            arguments=["-ORBsupportPerThreadTimeOut", "1", *settings.get("corba.args", "").split()],
+        )
+        servers = settings.words("corba.nameservers") if settings.flag("naming.enable") else ()
+        self._registration: Final = Registration(self.orb, servers, reporter)
+        self._objects: Final = set_up(self.orb, report=reporter.take)
+        self._manager: ManagerServant | None = None
+
+    def properties(self) -> Mapping[str, str]:
+        return {"corba.id": "omniORB"}
+
+    def close(self) -> None:
+        self._registration.close()
+        if self._owns_orb:
+            self.orb.shutdown()
+
+    # What others can call
+
+    def offer_manager(self, manager: Manager, key: str) -> Any:
+        self._manager = ManagerServant(manager)
+        return self.orb.activate(self._manager, key)._narrow(RTM.Manager)
+
+    def withdraw_manager(self) -> None:
+        if self._manager is not None:
+            self.orb.deactivate(self._manager)
+            self._manager = None
+
+    def offer_component(self, component: Component, key: str) -> Any:
+        return self._objects.offer(component, key)
+
+    def withdraw_component(self, component: Component) -> None:
+        self._objects.withdraw(component)
+
+    def port_reference(self, port: Port) -> Any:
+        return self._objects.port(port)
+
+    # Names
+
+    def bind(self, names: Iterable[str], reference: Any) -> None:
+        self._registration.bind(names, reference)
+
+    def unbind(self, names: Iterable[str]) -> None:
+        self._registration.unbind(names)
+
+    def update_names(self) -> None:
+        self._registration.update()
+
+    def is_free(self, name: str) -> bool:
+        return self._registration.is_free(name)
+
+    def instance_names(self) -> set[str]:
+        return self._registration.instance_names()
+
+    def ports_in(self, context: str, kind: str) -> list[tuple[str, PeerPort]]:
+        found = self._registration.objects_in(context, kind)
+        return [(name, self._objects.port_behind(one)) for name, one in found]
+
+    # Other managers and components
+
+    def manager_at(self, address: str) -> PeerManager:
+        reference = self.orb.to_reference(_manager_location(address))
+        with peer(f"the manager at {address}"):
+            manager = reference._narrow(RTM.Manager) if reference is not None else None
+        if manager is None:
+            raise RtcError(f"{address} is no manager")
+        return PeerManager(manager)
+
+    def remote_manager(self, reference: Any) -> PeerManager:
+        return PeerManager(reference)
+
+    def is_same(self, one: Any, other: Any) -> bool:
+        return is_same(one, other)
+
+    def member(self, name: str) -> ForeignMember | None:
+        try:
+            return ForeignMember(self._component_at(f"rtcname://*/{name}"), self._objects)
+        except RtcError:
+            return None
+
+    def connect(
+        self, ports: Sequence[str], local: Mapping[str, Any], name: str, properties: Mapping[str, str]
+    ) -> None:
+        references = []
+        for address in ports:
+            component, _, port = address.rpartition(".")
+            owner = local[component] if component in local else self._component_at(component)
+            references.append(_port(owner, port, address))
+        profile = RTC.ConnectorProfile(name, "", references, to_nv_list(properties))
+        with peer(ports[0]):
+            code, _ = references[0].connect(profile)
+        if code != RTC.RTC_OK:
+            raise RtcError(f"{name} cannot be connected: {code}")
+
+    def activate_at(self, address: str) -> None:
+        component = self._component_at(address)
+        with peer(address):
+            for context in component.get_owned_contexts():
+                code = context.activate_component(component)
+                if code != RTC.RTC_OK:
+                    raise RtcError(f"{address} cannot be activated: {code}")
+
+    def _component_at(self, address: str) -> Any:
+        """`rtcname://HOST[:PORT]/PATH` (HOST may be `*`, the path's `.rtc` left out) or `rtcloc://HOST:PORT/CATEGORY/NAME`."""
+        kind, _, rest = address.partition("://")
+        place, _, path = rest.partition("/")
+        if kind == "rtcloc":
+            found = list(self.manager_at(place).components_by_name(path))
+        elif kind == "rtcname":
+            servers = self._registration.servers if place in ("*", "") else (NameServer(self.orb, place),)
+            found = [one for server in servers for one in _named(server, path)]
+        else:
+            raise RtcError(f"{address}: write rtcname://HOST/NAME or rtcloc://HOST:PORT/CATEGORY/NAME")
+        lost: PeerLostError | None = None
+        for one in found:
+            try:
+                with peer(address):
+                    component = one._narrow(RTC.RTObject)
+            except PeerLostError as error:
+                lost = error
+                continue
+            if component is not None:
+                return component
+        raise lost or RtcError(f"{address}: there is no such component")
+
+
+def _named(server: NameServer, path: str) -> list[Any]:
+    """What has the path, without `.rtc`, at a server; else everything of that name anywhere."""
+    reference = server.resolve(path if path.endswith(".rtc") else f"{path}.rtc")
+    if reference is not None:
+        return [reference]
+    if "/" in path:
+        return []
+    paths = [place for place, binding in server.walk() if (binding.name, binding.kind) == (path, "rtc")]
+    return [found for place in paths if (found := server.resolve(place)) is not None]
+
+
+def _port(component: Any, name: str, address: str) -> Any:
+    with peer(address):
+        for port in component.get_ports():
+            if port.get_port_profile().name.rpartition(".")[2] == name:
+                return port
+    raise RtcError(f"{address}: the component has no port {name!r}")
+
+
+def _manager_location(address: str) -> str:
+    """The corbaloc of `HOST[:PORT][/KEY]`."""
+    if address.startswith(("corbaloc:", "IOR:")):
+        return address
+    place, _, key = address.strip().partition("/")
+    host, colon, port = place.rpartition(":")
+    if not colon or place.endswith("]"):
+        host, port = place, str(MASTER_PORT)
+    return f"corbaloc:iiop:{host}:{port}/{key or DEFAULT_KEY}"
+
+
+def _endpoints(settings: Properties) -> str:
+    """`corba.endpoints`; a master is reached at the port of `corba.master_manager`, too."""
+    endpoints = settings.get("corba.endpoints", "all")
+    if not settings.flag("manager.is_master"):
+        return endpoints
+    host, _, port = settings["corba.master_manager"].partition("/")[0].rpartition(":")
+    if not host:
+        port = str(MASTER_PORT)
+    first = endpoints.split(",")[0].strip()
+    own = "" if first in ("", "all") else first.rpartition(":")[0] if ":" in first else first
+    at_master = f"{own}:{port}"
+    if at_master in [part.strip() for part in endpoints.split(",")]:
+        return endpoints
+    return at_master if first in ("", "all") else f"{at_master}, {endpoints}"
+
+
+def _runs() -> bool:
+    """Whether somebody has started the process's ORB, who then ends it, too."""
+    try:
+        current_orb()
+    except RtcError:
+        return False
+    return True
