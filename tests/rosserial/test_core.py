@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from typing import Any
 
 import pytest
 
@@ -621,6 +622,34 @@ def test_a_line_that_takes_nothing_for_long_gets_the_newest() -> None:
         switch(data=value)
     scene.step(2)
     assert len(board.taken(led)) == 90
+
+
+def test_a_line_that_is_always_too_slow_carries_what_is_new() -> None:
+    """Also where nobody knows its rate: a network board with a poor connection takes half of what is published."""
+    scene = Scene()
+    board = RosLib(scene)
+    text = board.subscriber("text", "std_msgs/String")
+    board.plug()
+    scene.step(400)
+    write = scene.writer("/text", STRING)
+    send = scene.link.send
+
+    def full_after_one(message: bytes, address: Any) -> bool:
+        scene.link.waiting = len(message)
+        return send(message, address)
+
+    scene.link.send = full_after_one  # type: ignore[method-assign]
+    ages = []
+    for i in range(3_000):
+        write(data=f"{i:0190}")
+        if i % 20 == 0:
+            scene.link.waiting = 0
+            scene.port.room("a", scene.now)
+        scene.step()
+        ages += [i - int(body[4:]) for body in board.taken(text)]
+    assert len(ages) > 1_000
+    assert max(ages) <= 200
+    assert max(ages[len(ages) // 4 :]) <= 60
 
 
 def test_a_cable_is_pulled_and_plugged_in_again() -> None:

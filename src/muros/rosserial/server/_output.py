@@ -12,7 +12,7 @@ from typing import Any, Protocol
 __all__ = ["Link", "Output", "Source"]
 
 _STALL = 100
-"""A line that takes nothing for so long is too slow for what waits: of each topic the newest messages stay, in ms."""
+"""A line that does not keep up for so long is too slow for what waits: of each topic the newest stay, in ms."""
 _POLL = 20
 """When to look again at a line that takes nothing now, in ms; the link says it earlier if it can."""
 _SLACK = 1.005
@@ -65,7 +65,7 @@ class Output:
         self._urgent: deque[bytes | Callable[[int], bytes]] = deque()
         self._ready: deque[Source] = deque()
         self._free_us = 0.0
-        self._stalled: int | None = None
+        self._full_since: int | None = None
         self._ended = False
 
     def post(self, frame: bytes | Callable[[int], bytes]) -> bool:
@@ -89,6 +89,7 @@ class Output:
         """Forgets what is urgent: the line is gone, or new."""
         self._urgent.clear()
         self._free_us = 0.0
+        self._full_since = None
         self._ended = False
 
     def end(self, frame: bytes, now: int) -> None:
@@ -106,28 +107,23 @@ class Output:
             if self._free_us > now_us + self._lead_us:
                 return now + max(1, int(self._free_us - now_us - self._lead_us) // 1000)
             if self.link.backlog(self.address):
-                if self._stalled is None:
-                    self._stalled = now
+                if self._full_since is None:
+                    self._full_since = now
                 return now + _POLL
-            if self._stalled is not None:
-                self._let_go(now - self._stalled)
+            if self._full_since is not None and now - self._full_since >= _STALL:
+                for source in ready:
+                    source.hurry()
             batch, n = self._batch(now, now_us)
             if not batch:
-                return None
+                break
             self._free_us = max(self._free_us, now_us) + n * self.byte_us * _SLACK
             if self.link.send(batch[0] if len(batch) == 1 else b"".join(batch), self.address):
                 self.frames += len(batch)
                 self.bytes += n
             else:
                 self.dropped += len(batch)
+        self._full_since = None
         return None
-
-    def _let_go(self, stalled: int) -> None:
-        """The line takes something again, after so many ms."""
-        self._stalled = None
-        if stalled >= _STALL:
-            for source in self._ready:
-                source.hurry()
 
     def _batch(self, now: int, now_us: int) -> tuple[list[bytes], int]:
         """The next frames to send, and their bytes: as many as are worth one call, and the line is free for."""
