@@ -11,8 +11,10 @@ import pytest
 
 from muros.rtc.codes import ReturnCode
 from muros.rtc.data import TRANSPORTS, DataInPort, DataOutPort, DataPort
+from muros.rtc.data._transports import each_offer, offered_in
 from muros.rtc.profiles import ConnectorProfile
-from tests.rtc.data.kit import MemoryTransport, Pair, TimedLong, TimedLongType
+from tests.rtc.data.kit import MemoryTransport, Pair, Time, TimedLong, TimedLongType
+from tests.rtc.data.test_behaviour import wait_for
 
 RECORDED: dict[str, dict[str, Any]] = {
     case["label"]: case
@@ -153,6 +155,41 @@ def test_both_inports_of_a_fan_out_get_every_value(bench: Bench) -> None:
     assert one.is_new()
     assert two.is_new()
     assert out.data_type.encoded == 1, "encoded once for both"  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("names", ["out in in2", "in out in2", "in in2 out"])
+@pytest.mark.parametrize("interface", ["corba_cdr", "direct"])
+def test_all_inports_of_one_connection_get_every_value(bench: Bench, names: str, interface: str) -> None:
+    """Recorded OutPorts send to the first InPort only."""
+    ports = tuple(bench.ports[name] for name in names.split())
+    properties = {
+        "dataport.interface_type": interface,
+        "dataport.dataflow_type": "push",
+        "dataport.subscription_type": "new",
+    }
+    code, profile = ports[0].connect(ConnectorProfile("wire", "", ports, properties))
+    assert code is ReturnCode.RTC_OK, bench.findings
+    out, *ins = (bench.ports[name] for name in ("out", "in", "in2"))
+    assert isinstance(out, DataOutPort)
+    assert out.write(TimedLong(Time(), 7))
+    assert len(out.status) == len(out.connector_infos) == 2
+    for port in ins:
+        assert isinstance(port, DataInPort)
+        wait_for(port.is_new)
+        assert port.read().data == 7
+    assert ports[1].disconnect(profile.connector_id) is ReturnCode.RTC_OK
+    assert not any(port.connectors or port.connector_infos for port in ports)
+
+
+def test_an_inport_that_knows_no_places_is_found_beside_others() -> None:
+    """A port of OpenRTM-aist in a connection of three has the usual names only."""
+    ports = (object(), object(), object())
+    profile = ConnectorProfile("wire", "id", ports, {"a.inport_ior": "theirs"})  # type: ignore[arg-type]
+    ours = offered_in(profile, 2, {"a.inport_ior": "ours"})
+    assert ours == {"a.inport_ior.2": "ours"}
+    found = each_offer(profile.with_properties(ours))
+    assert [one.text("a.inport_ior") for one in found] == ["theirs", "ours"]
+    assert each_offer(profile) == (profile,)
 
 
 @pytest.mark.parametrize("key", ["fan_in", "connection_limit"])

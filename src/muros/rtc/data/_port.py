@@ -22,7 +22,7 @@ from muros.rtc.data._options import (
     parse_options,
 )
 from muros.rtc.data._serializers import CDR, codec_of, marshaling_types
-from muros.rtc.data._transports import TRANSPORTS, Connection, TransportError
+from muros.rtc.data._transports import TRANSPORTS, Connection, TransportError, offered_in
 from muros.rtc.data._types import AnyDataType, DataType, same_type
 from muros.rtc.ports import Port, PortOwner
 from muros.rtc.profiles import ConnectorProfile, PortProfile
@@ -69,7 +69,7 @@ class DataPort(Port, Generic[T]):
         self._clock = clock
         self._wall = wall
         self._links_lock = threading.Lock()
-        self._links_by_id: dict[str, Link] = {}
+        self._links_by_id: dict[str, tuple[Link, ...]] = {}
 
     # ---- what it is
 
@@ -91,11 +91,12 @@ class DataPort(Port, Generic[T]):
     @property
     def connector_infos(self) -> tuple[ConnectorInfo, ...]:
         """Its connections, in the order of `status`."""
-        return tuple(link.info for link in self._links_by_id.values())
+        return tuple(link.info for link in self._all_links())
 
     def link(self, connector_id: str) -> Link | None:
-        """The connector of this id, with its counts of values lost."""
-        return self._links_by_id.get(connector_id)
+        """The connector of this id, with its counts of values lost; the first where it joins several ports."""
+        links = self._links_by_id.get(connector_id)
+        return links[0] if links else None
 
     # ---- its part in a negotiation
 
@@ -119,9 +120,10 @@ class DataPort(Port, Generic[T]):
             connection, options = self._understand(profile)
             if options.dataflow is not self.calls:
                 link = self._receiving_link(connection, options)
-                self._add(profile, link)
+                self._add(profile, (link,))
                 if link.offer is not None:
-                    profile = profile.with_properties(link.offer.properties)
+                    place = profile.ports.index(self)
+                    profile = profile.with_properties(offered_in(profile, place, link.offer.properties))
         except OptionError as error:
             return self._refuse_options(profile, error), profile
         except TransportError as error:
@@ -132,7 +134,7 @@ class DataPort(Port, Generic[T]):
         try:
             connection, options = self._understand(profile)
             if options.dataflow is self.calls:
-                self._add(profile, self._calling_link(connection, options))
+                self._add(profile, self._calling_links(connection, options))
             for remark in options.remarks:
                 self._tell("bad-connection-option", f"connection {profile.name}: {remark}")
         except OptionError as error:
@@ -143,14 +145,13 @@ class DataPort(Port, Generic[T]):
 
     def unsubscribe_interfaces(self, profile: ConnectorProfile) -> None:
         with self._links_lock:
-            link = self._links_by_id.get(profile.connector_id)
-            if link is None:
-                return
+            links = self._links_by_id.get(profile.connector_id, ())
             self._links_by_id = {
-                id_: one for id_, one in self._links_by_id.items() if id_ != profile.connector_id
+                id_: others for id_, others in self._links_by_id.items() if id_ != profile.connector_id
             }
             self._links_changed()
-        link.close()
+        for link in links:
+            link.close()
 
     def codec_for(self, options: Mapping[str, str], marshaling: str) -> AnyDataType | None:
         """The serializer for a connection with these effective properties. For ports that take `any` type."""
@@ -165,6 +166,13 @@ class DataPort(Port, Generic[T]):
     def _calling_link(self, connection: Connection, options: DataOptions) -> Link:
         """The connector of the side that calls. TransportError where the way leads nowhere."""
         raise NotImplementedError
+
+    def _calling_links(self, connection: Connection, options: DataOptions) -> tuple[Link, ...]:
+        """One for each port that this one calls."""
+        return (self._calling_link(connection, options),)
+
+    def _all_links(self) -> tuple[Link, ...]:
+        return tuple(link for links in self._links_by_id.values() for link in links)
 
     def _links_changed(self) -> None:
         """`_links_by_id` is another one. With the lock held."""
@@ -182,14 +190,11 @@ class DataPort(Port, Generic[T]):
             clock=self._clock,
         )
 
-    def _link_here(self, profile: ConnectorProfile, kind: type[L]) -> L | None:
-        """The connector of the other side, where that is a port of this process."""
-        for peer in profile.ports:
-            if isinstance(peer, DataPort) and peer is not self:
-                link = peer.link(profile.connector_id)
-                if isinstance(link, kind):
-                    return link
-        return None
+    def _links_here(self, profile: ConnectorProfile, kind: type[L]) -> tuple[L, ...]:
+        """The connectors of the other side, as far as its ports are of this process."""
+        peers = (peer for peer in profile.ports if isinstance(peer, DataPort) and peer is not self)
+        links = (peer.link(profile.connector_id) for peer in peers)
+        return tuple(link for link in links if isinstance(link, kind))
 
     def _drop(self, connector_id: str) -> None:
         """The other side of a connection has gone: let go of it."""
@@ -261,11 +266,13 @@ class DataPort(Port, Generic[T]):
         )
         return error.code
 
-    def _add(self, profile: ConnectorProfile, link: Link) -> None:
+    def _add(self, profile: ConnectorProfile, links: tuple[Link, ...]) -> None:
         with self._links_lock:
-            self._links_by_id = {**self._links_by_id, profile.connector_id: link}
+            before = self._links_by_id.get(profile.connector_id, ())
+            self._links_by_id = {**self._links_by_id, profile.connector_id: (*before, *links)}
             self._links_changed()
-        link.connected()
+        for link in links:
+            link.connected()
 
     def _forward(self, finding: Finding) -> None:
         self.report(finding)

@@ -30,6 +30,8 @@ __all__ = [
     "PushTransport",
     "Put",
     "TransportError",
+    "each_offer",
+    "offered_in",
     "register_transport",
 ]
 
@@ -146,3 +148,33 @@ def register_transport(
         TRANSPORTS.push[interface_type] = push
     if pull is not None:
         TRANSPORTS.pull[interface_type] = pull
+
+
+def offered_in(
+    profile: ConnectorProfile, place: int, properties: Mapping[str, PropertyValue]
+) -> Mapping[str, PropertyValue]:
+    """What an offer's properties are called where a connection joins more than two ports.
+
+    The first port that offers has the usual names, which are all that OpenRTM-aist looks at; each also has them with
+    its `place` among the ports behind them, so that none is lost.
+    """
+    if len(profile.ports) <= 2:
+        return properties
+    usual = {name: value for name, value in properties.items() if name not in profile.properties}
+    return {**usual, **{f"{name}.{place}": value for name, value in properties.items()}}
+
+
+def each_offer(profile: ConnectorProfile) -> tuple[ConnectorProfile, ...]:
+    """The profile as it would be if each of the ports that offer something were the only one that does."""
+    if len(profile.ports) <= 2:
+        return (profile,)
+    found: list[dict[str, PropertyValue]] = []
+    for place in range(len(profile.ports)):
+        ending = f".{place}"
+        names = [name.removesuffix(ending) for name in profile.properties if name.endswith(ending)]
+        own = {name: profile.properties[name + ending] for name in names if name in profile.properties}
+        if own:
+            found.append(own)
+    if not any(all(profile.properties[name] == own[name] for name in own) for own in found):
+        found.insert(0, {})  # who has the usual names knows no places
+    return tuple(profile.with_properties(own) for own in found)

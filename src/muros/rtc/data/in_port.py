@@ -221,7 +221,8 @@ class DataInPort(DataPort[T]):
         return link
 
     def _calling_link(self, connection: Connection, options: DataOptions) -> Link:
-        source = self._link_here(connection.profile, PullSource)
+        sources = self._links_here(connection.profile, PullSource)
+        source = sources[0] if sources else None
         if options.interface_type != DIRECT:
             outlet = TRANSPORTS.pull[options.interface_type].reach_outlet(connection)
         elif source is not None:
@@ -232,7 +233,7 @@ class DataInPort(DataPort[T]):
         return PullFetcher(self._setup(connection, options), self._condition, self._arrivals, outlet, waiting)
 
     def _links_changed(self) -> None:
-        links = tuple(self._links_by_id.values())
+        links = self._all_links()
         self._pushed = tuple(link for link in links if isinstance(link, PushReceiver))
         self._pulled = tuple(link for link in links if isinstance(link, PullFetcher))
 

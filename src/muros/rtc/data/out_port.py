@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import ClassVar, TypeVar, cast
 
 from muros.findings import Finding
@@ -12,7 +13,7 @@ from muros.rtc.data._links import Link, OutLink, PullSource, PushReceiver, PushS
 from muros.rtc.data._options import Dataflow, DataOptions, OptionError, Side, Stamp
 from muros.rtc.data._port import DIRECT, DataPort
 from muros.rtc.data._samples import Outgoing, stamp
-from muros.rtc.data._transports import TRANSPORTS, Connection
+from muros.rtc.data._transports import TRANSPORTS, Connection, Inlet, each_offer
 from muros.rtc.data._types import DataType
 from muros.rtc.ports import PortOwner
 
@@ -114,19 +115,22 @@ class DataOutPort(DataPort[T]):
             link.offer = TRANSPORTS.pull[options.interface_type].offer_outlet(connection, link.get)
         return link
 
-    def _calling_link(self, connection: Connection, options: DataOptions) -> Link:
-        if options.interface_type != DIRECT:
-            return PushSender(
-                self._setup(connection, options),
-                TRANSPORTS.push[options.interface_type].reach_inlet(connection),
-            )
-        receiver = self._link_here(connection.profile, PushReceiver)
-        if receiver is None:
-            raise OptionError(ReturnCode.RTC_ERROR, "direct: the InPort is in another process")
-        return PushSender(self._setup(connection, options), receiver)
+    def _calling_links(self, connection: Connection, options: DataOptions) -> tuple[Link, ...]:
+        """Each InPort of the connection has a connector of its own."""
+        if options.interface_type == DIRECT:
+            inlets: list[Inlet | PushReceiver] = [*self._links_here(connection.profile, PushReceiver)]
+            if not inlets:
+                raise OptionError(ReturnCode.RTC_ERROR, "direct: the InPort is in another process")
+        else:
+            transport = TRANSPORTS.push[options.interface_type]
+            inlets = [
+                transport.reach_inlet(replace(connection, profile=profile))
+                for profile in each_offer(connection.profile)
+            ]
+        return tuple(PushSender(self._setup(connection, options), inlet) for inlet in inlets)
 
     def _links_changed(self) -> None:
-        links = tuple(self._links_by_id.values())
+        links = self._all_links()
         self._out_links = tuple(link for link in links if isinstance(link, (PushSender, PullSource)))
         self._stamps = any(Stamp.ON_WRITE in link.options.stamps for link in self._out_links)
         self._straight = None
