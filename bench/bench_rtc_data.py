@@ -22,10 +22,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT / "src"), str(ROOT / "bench")]
+sys.path[:0] = [str(ROOT), str(ROOT / "src")]
 
-from _rtc_data_worker import STAMP, TYPES, Receiver  # noqa: E402
-
+from bench._rtc_data_worker import STAMP, TYPES, Receiver  # noqa: E402
 from muros.rtc.codes import ReturnCode  # noqa: E402
 from muros.rtc.corba import data_type_of  # noqa: E402
 from muros.rtc.data import DataOutPort, connect  # noqa: E402
