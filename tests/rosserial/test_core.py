@@ -652,6 +652,20 @@ def test_a_line_that_is_always_too_slow_carries_what_is_new() -> None:
     assert max(ages[len(ages) // 4 :]) <= 60
 
 
+def test_latched_messages_all_come_however_slow_the_line() -> None:
+    """They replace each other nowhere: each transform of /tf_static is another one."""
+    scene = Scene(baud=9_600)
+    keep = scene.writer("/tf_static", BYTE, Qos(Reliability.RELIABLE, Durability.TRANSIENT_LOCAL, depth=100))
+    for value in range(80):
+        keep(data=value)
+    board = RosLib(scene)
+    latched = board.subscriber("tf_static", "std_msgs/Byte")
+    board.plug()
+    scene.step(3_000)
+    assert board.taken(latched) == [bytes([value]) for value in range(80)]
+    assert "line-too-slow" not in scene.codes()
+
+
 def test_a_cable_is_pulled_and_plugged_in_again() -> None:
     scene = Scene()
     board, led, _ = led_board(scene)

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
 __all__ = [
+    "LATCHED",
     "READ_DEPTH",
     "BodyError",
     "Caller",
@@ -27,6 +28,8 @@ __all__ = [
 ]
 
 
+LATCHED = frozenset({"/tf_static"})
+"""Topics whose messages are kept for whoever comes new, without their publishers saying so in all worlds."""
 READ_DEPTH = 1_000
 """Messages of one topic that a world keeps for a board while its line has no room; newer ones replace older ones."""
 
@@ -87,6 +90,10 @@ class Publisher(Shape, Protocol):
 
 class Subscriber(Shape, Protocol):
     """Where messages for a board wait; the oldest are dropped when they become too many."""
+
+    @property
+    def latched(self) -> bool:
+        """Whether no message replaces another: publishers keep them for whoever comes new, as those of /tf_static."""
 
     def take(self) -> bytes | None:
         """The oldest message, None if there is none. Raises BodyError for one that cannot be converted."""

@@ -186,7 +186,9 @@ class Subscription(Endpoint):
         self._collect()
 
     def _collect(self) -> None:
-        """Takes what has come, and drops the oldest beyond the number that may wait here."""
+        """Takes what has come, and drops the oldest beyond the number that may wait here; latched ones all wait."""
+        if self.subscriber is None or self.subscriber.latched:
+            return
         waiting = self._waiting
         dropped = 0
         while (body := self._take()) is not None:

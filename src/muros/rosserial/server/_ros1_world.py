@@ -27,7 +27,15 @@ from muros.ros1 import (
     UnreachableError,
     resolve,
 )
-from muros.rosserial.server._door import READ_DEPTH, BodyError, NamedService, OnData, OnReply, RefusedError
+from muros.rosserial.server._door import (
+    LATCHED,
+    READ_DEPTH,
+    BodyError,
+    NamedService,
+    OnData,
+    OnReply,
+    RefusedError,
+)
 
 __all__ = ["Ros1World"]
 
@@ -384,8 +392,12 @@ class _Subscriber(_Shaped):
     def take(self) -> bytes | None:
         return self._down(self._waiting.popleft()) if self._waiting else None
 
+    @property
+    def latched(self) -> bool:
+        return self._topic in LATCHED
+
     def forget(self) -> None:
-        while len(self._waiting) > 1:  # the newest may be a latched one
+        while len(self._waiting) > 1 and not self.latched:  # the newest may be a latched one
             self._waiting.popleft()
 
     def close(self) -> None:

@@ -12,7 +12,15 @@ from typing import Any, NamedTuple
 
 from muros import interfaces
 from muros.interfaces import CdrError, Converter, InterfaceError
-from muros.rosserial.server._door import READ_DEPTH, BodyError, NamedService, OnData, OnReply, RefusedError
+from muros.rosserial.server._door import (
+    LATCHED,
+    READ_DEPTH,
+    BodyError,
+    NamedService,
+    OnData,
+    OnReply,
+    RefusedError,
+)
 from muros.rosserial.server._node_parameters import PARAMETER_KINDS, NodeParameters
 from muros.rosserial.server._parameters import plain_name
 from muros.space import (
@@ -33,7 +41,6 @@ from muros.space import (
 
 __all__ = ["SpaceNode", "SpaceWorld"]
 
-_LATCHED = frozenset({"/tf_static"})
 _LEVELS = (10, 20, 30, 40, 50)
 """Levels of rcl_interfaces/msg/Log for those of rosserial."""
 _USE_SIM_TIME = "use_sim_time"
@@ -271,7 +278,7 @@ class _Publisher(_Converted):
     def __init__(self, node: SpaceNode, full: str, converter: Converter) -> None:
         super().__init__(converter)
         self._convert = converter.to_cdr
-        durability = Durability.TRANSIENT_LOCAL if full in _LATCHED else Durability.VOLATILE
+        durability = Durability.TRANSIENT_LOCAL if full in LATCHED else Durability.VOLATILE
         self._writer = node.participant.writer(
             Topic(interfaces.dds_topic(full), interfaces.dds_type_name(converter.ros2_type)),
             Qos(depth=node.world.depth, durability=durability),
@@ -304,7 +311,7 @@ class _Subscriber(_Converted):
             and each.role is Role.WRITER
             and each.participant.domain == node.participant.domain
         ]
-        latched = full in _LATCHED or (
+        latched = full in LATCHED or (
             bool(writers) and all(qos.durability >= Durability.TRANSIENT_LOCAL for qos in writers)
         )
         self._qos = Qos(
@@ -329,8 +336,12 @@ class _Subscriber(_Converted):
         except CdrError as error:
             raise BodyError(str(error)) from None
 
+    @property
+    def latched(self) -> bool:
+        return self._qos.durability > Durability.VOLATILE
+
     def forget(self) -> None:
-        if self._qos.durability is Durability.VOLATILE:
+        if not self.latched:
             while self.reader.take() is not None:
                 pass
 

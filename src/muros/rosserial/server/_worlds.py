@@ -177,6 +177,10 @@ class _Subscribers(_Shapes):
                 return body
         return None
 
+    @property
+    def latched(self) -> bool:
+        return any(part.latched for part in self._parts)
+
     def forget(self) -> None:
         for part in self._parts:
             part.forget()
