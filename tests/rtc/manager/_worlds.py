@@ -70,13 +70,6 @@ class MemoryWorld:
             raise PeerLostError(f"no manager at {address}")
         return self.managers[address]
 
-    def remote_manager(self, reference: object) -> RemoteManager:
-        assert isinstance(reference, FakeManager)
-        return reference
-
-    def is_same(self, one: object, other: object) -> bool:
-        return one == other
-
     def port_reference(self, port: Port) -> object:
         return port
 

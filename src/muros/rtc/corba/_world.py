@@ -9,7 +9,7 @@ from muros.rtc.codes import PeerLostError, RtcError
 from muros.rtc.corba._conversion import to_nv_list
 from muros.rtc.corba._lost import peer
 from muros.rtc.corba._manager import ManagerServant, PeerManager
-from muros.rtc.corba._naming import NameServer, is_same
+from muros.rtc.corba._naming import NameServer
 from muros.rtc.corba._orb import Orb, current_orb, start_orb
 from muros.rtc.corba._organization import ForeignMember
 from muros.rtc.corba._registration import Registration
@@ -105,12 +105,6 @@ class CorbaWorld:
         if manager is None:
             raise RtcError(f"{address} is no manager")
         return PeerManager(manager)
-
-    def remote_manager(self, reference: Any) -> PeerManager:
-        return PeerManager(reference)
-
-    def is_same(self, one: Any, other: Any) -> bool:
-        return is_same(one, other)
 
     def member(self, name: str) -> ForeignMember | None:
         try:
