@@ -67,6 +67,8 @@ class Publication:
         self.latch = latch
         self.dropped = 0
         """Messages that one subscriber or another did not get."""
+        self.on_subscriber: Callable[[], object] | None = None
+        """Called when a subscriber has connected."""
         self._node = node
         self._last: bytes | None = None
         self._connections: list[Connection] = []
@@ -103,6 +105,8 @@ class Publication:
         self._connections.append(connection)
         if self._last is not None:
             connection.send(self._last)
+        if self.on_subscriber is not None:
+            self.on_subscriber()
 
     def close(self) -> None:
         """Hangs up."""

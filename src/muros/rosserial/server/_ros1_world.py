@@ -39,6 +39,8 @@ from muros.rosserial.server._door import (
 
 __all__ = ["Ros1World"]
 
+_UNHEARD = 50
+"""Lines of a log that are kept for its first reader."""
 LOOK = 1.0
 """Seconds between looks at whether somebody serves what a board calls."""
 
@@ -189,6 +191,8 @@ class Ros1BoardNode:
         self._rosout = node.publish(
             "/rosout", self._log_type, interfaces.md5(self._log_type), _text(self._log_type)
         )
+        self._rosout.on_subscriber = self._catch_up
+        self._unheard: deque[bytes] = deque(maxlen=_UNHEARD)
         self._diagnostics: tuple[Publication, Converter] | None = None
         self._callers: list[_Caller] = []
 
@@ -219,7 +223,11 @@ class Ros1BoardNode:
         strings = (self.node.name, text, "", "")
         packed = b"".join(struct.pack("<I", len(raw)) + raw for raw in (each.encode() for each in strings))
         level = _LEVELS[min(level, len(_LEVELS) - 1)]
-        self._rosout.publish(self._header() + struct.pack("<B", level) + packed + struct.pack("<II", 0, 0))
+        line = self._header() + struct.pack("<B", level) + packed + struct.pack("<II", 0, 0)
+        if self._rosout.subscribers:
+            self._rosout.publish(line)
+        else:
+            self._unheard.append(line)
 
     def parameter(self, name: str) -> Any:
         """A parameter by the name that the board says."""
@@ -274,6 +282,11 @@ class Ros1BoardNode:
             ) from None
         request = _Passing(f"{kind}_Request", named.request_md5)
         return _ServiceIn(name, kind, md5, request, _Passing(f"{kind}_Response", named.response_md5))
+
+    def _catch_up(self) -> None:
+        """Says what nobody could hear: a board's first lines come before anybody has connected to its node."""
+        while self._unheard:
+            self._rosout.publish(self._unheard.popleft())
 
     async def _leave(self) -> None:
         await asyncio.gather(self._opened, return_exceptions=True)
