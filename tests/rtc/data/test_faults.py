@@ -428,3 +428,32 @@ def test_connector_listeners_know_the_connection(pair: Pair) -> None:
 def publishers() -> list[threading.Thread]:
     """Threads of publishers."""
     return [thread for thread in threading.enumerate() if thread.name.startswith("port out")]
+
+
+def test_a_sender_may_write_and_leave() -> None:
+    pair = Pair()
+    pair.connect({"dataport.inport.buffer.read.empty_policy": "do_nothing"})
+    assert pair.out.write(long(1))
+    assert pair.out.write(long(2))
+    pair.out.disconnect_all()
+    assert pair.in_.connectors == ()
+    assert pair.in_.is_new()
+    assert [pair.in_.try_read() for _ in range(3)] == [
+        (DataPortStatus.PORT_OK, long(1)),
+        (DataPortStatus.PORT_OK, long(2)),
+        (DataPortStatus.PRECONDITION_NOT_MET, long(2)),
+    ]
+    assert not pair.in_.is_new()
+
+
+def test_of_many_that_wrote_and_left_the_first_are_forgotten_and_that_is_said() -> None:
+    pair = Pair()
+    for number in range(10):
+        pair.connect()
+        assert pair.out.write(long(number))
+        pair.out.disconnect_all()
+    values = []
+    while pair.in_.is_new():
+        values.append(pair.in_.read().data)
+    assert values == list(range(2, 10))
+    assert pair.codes() == ["values-unread"] * 2

@@ -484,6 +484,17 @@ class PushReceiver(InLink):
             self.tell(event, sample)
         return answer
 
+    def forgotten(self) -> None:
+        """Its values are not kept any longer: it ended, and nobody read them."""
+        self._find(
+            "values-unread",
+            f"{{n}} value{{s}} of connection {self._label} not read",
+            "the connection ended, and many after it",
+            "read the port oftener",
+            Severity.INFO,
+            new=len(self.buffer.ring),
+        )
+
 
 class PullFetcher(InLink):
     """Asks the OutPort when it is read. `waiting`: how many values an OutPort of this process has, else None."""

@@ -22,6 +22,9 @@ from muros.rtc.ports import PortOwner
 
 __all__ = ["DataInPort"]
 
+ENDED: Final = 8
+"""Connections that have ended whose values wait to be read, at most; the oldest go first."""
+
 T = TypeVar("T")
 
 
@@ -149,7 +152,11 @@ class DataInPort(DataPort[T]):
             with self._condition:
                 taken = self._take_oldest(pushed)
             if taken is not None:
-                taken[0].tell(DataEvent.ON_BUFFER_READ, taken[1])
+                link = taken[0]
+                link.tell(DataEvent.ON_BUFFER_READ, taken[1])
+                if link.closed and not link.buffer.ring:
+                    with self._links_lock:
+                        self._links_changed()
                 return DataPortStatus.PORT_OK, *taken
         status = DataPortStatus.PRECONDITION_NOT_MET
         for puller in pulled:
@@ -234,7 +241,11 @@ class DataInPort(DataPort[T]):
 
     def _links_changed(self) -> None:
         links = self._all_links()
-        self._pushed = tuple(link for link in links if isinstance(link, PushReceiver))
+        # What came before its connection ended can still be read: a sender may write and leave.
+        ended = tuple(link for link in self._pushed if link not in links and link.buffer.ring)
+        for link in ended[:-ENDED]:
+            link.forgotten()
+        self._pushed = (*ended[-ENDED:], *(link for link in links if isinstance(link, PushReceiver)))
         self._pulled = tuple(link for link in links if isinstance(link, PullFetcher))
 
 
