@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -19,6 +20,7 @@ from muros.rtc.reports import Reporter
 from tests.dds.domains import free_domain
 from tests.rtc.manager._processes import ENVIRONMENT, Managers, wait_until
 
+VECTORS = Path(__file__).parents[2] / "vectors" / "rtc"
 EXAMPLES = Path(__file__).parents[3] / "examples" / "rtc"
 
 
@@ -102,6 +104,17 @@ def test_sequences(managers: Managers, world: CorbaWorld) -> None:
 def test_configuration(managers: Managers, world: CorbaWorld) -> None:
     sample = run(managers, "config_sample.py", "-f", str(EXAMPLES / "config_sample.conf"))
     wait_until(lambda: world.instance_names() == {"ConfigSample0"})
+    captured = json.loads((VECTORS / "component_configsample.json").read_text())["component_profile"][
+        "properties"
+    ]
+    profile = component(world, "ConfigSample0").get_component_profile()
+    ours = {one.name for one in profile.properties}
+    told = {one["name"] for one in captured}
+    # What is not told: no configuration file, no set mode1.vector..., addresses of the ORB, the services of all.
+    assert {name for name in told - ours if not name.startswith("conf.")} <= {
+        *("port", "config_file", "corba.endpoints_ipv4", "corba.endpoints_ipv6"),
+        *("sdo.service.consumer.available_services", "sdo.service.provider.available_services"),
+    }
     activate(world, "ConfigSample0")
     managers.wait_for(sample, "123 | 1 | 0.11 | 9.9 | mode0 | dara | [0.0, 0.1, 0.2]\n")
     configuration = component(world, "ConfigSample0").get_configuration()

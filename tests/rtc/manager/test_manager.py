@@ -81,6 +81,8 @@ def test_a_component_is_made_named_and_ended(make: Make) -> None:
     assert world.offered == {"test.Foo0": foo}
     assert foo.properties["naming.names"] == "robot.host_cxt/Foo0.rtc"
     assert foo.properties["os.hostname"] == "robot"
+    assert foo.properties["exec_cxt.sync_transition"] == "YES"
+    assert foo.properties["exec_cxt.periodic.rate"] == "100"  # the class knows better than the default
     assert foo.properties["corba.endpoints"] == "127.0.0.1:1"
     assert foo.properties["manager.instance_name"] == "manager"
     assert foo.state() is LifeCycleState.INACTIVE_STATE

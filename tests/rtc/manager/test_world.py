@@ -76,6 +76,25 @@ def test_the_properties_that_tools_ask_for_are_those_of_the_captured_manager(
     assert manager.get_service("x") is None
 
 
+def test_names_and_types_are_those_of_the_captured_tree(
+    managers: Managers, orb: Orb, name_server: RunningNameServer
+) -> None:
+    """Tools go by kinds and types: a host's context, a manager in it, a component in it."""
+    managers.start("-d", "-o", "naming.formats:%h.host_cxt/%n.rtc")
+    managers.start("-o", "manager.components.precreate:Wheel")
+    server = NameServer(orb, name_server.address)
+    wait_until(lambda: server.resolve("robot.host_cxt/Wheel0.rtc") is not None)
+    (host,) = json.loads((VECTORS / "naming_tree.json").read_text())
+    (context,) = server.list()
+    assert (context.kind, context.is_context) == (host["kind"], host["type"] == "ncontext")
+    types = {one["kind"]: one["type_id"] for one in host["children"]}
+    bound = {one.kind: f"{one.name}.{one.kind}" for one in server.list("robot.host_cxt")}
+    assert bound == {"mgr": "manager.mgr", "rtc": "Wheel0.rtc"}
+    for kind, name in bound.items():
+        octets = bytes.fromhex(orb.to_text(server.resolve(f"robot.host_cxt/{name}")).removeprefix("IOR:"))
+        assert types[kind].encode() + b"\0" in octets
+
+
 def test_components_come_and_go_by_corbaloc(managers: Managers, world: CorbaWorld) -> None:
     process = managers.start("-p", str(port := find_free_port()))
     manager = world.manager_at(f"127.0.0.1:{port}")

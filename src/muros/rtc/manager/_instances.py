@@ -1,8 +1,8 @@
 """What a new instance of a component begins with: its name and its properties.
 
-Properties come from, the later over the earlier: the component's specification; what it inherits of the manager; what
-the file named by `<category>.<type>.config_file` and then `<category>.<type>.*` of rtc.conf say; the same for
-`<category>.<instance>`; the file that the request names; the request.
+Properties come from, the later over the earlier: the defaults; the component's specification; what it inherits of the
+manager's settings; what the file named by `<category>.<type>.config_file` and then `<category>.<type>.*` of rtc.conf say;
+the same for `<category>.<instance>`; the file that the request names; the request.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Final
 
 from muros.rtc.codes import RtcError
 from muros.rtc.formats import Fields, expand
+from muros.rtc.manager._defaults import DEFAULTS
 from muros.rtc.properties import Properties, read_conf_file, split_list
 
 __all__ = ["POLICIES", "binding_names", "fields_of", "instance_properties", "numbered_names"]
@@ -46,7 +47,7 @@ def instance_properties(
     `asked`: those of the request. `find_file` makes a path of a file's name in rtc.conf.
     """
     category, type_name = spec.get("category", ""), spec.get("type_name", "")
-    properties = {**spec, **{key: text for key, text in settings.items() if key.startswith(INHERITED)}}
+    properties = {**_inherited(DEFAULTS), **spec, **_inherited(settings)}
     files = []
     for name in (type_name, instance_name):
         own = settings.node(f"{category}.{name}" if category else name)
@@ -64,6 +65,10 @@ def instance_properties(
     if files:
         properties["config_file"] = ",".join(files)
     return properties
+
+
+def _inherited(settings: Mapping[str, str]) -> dict[str, str]:
+    return {key: text for key, text in settings.items() if key.startswith(INHERITED)}
 
 
 def numbered_names(type_name: str) -> Iterator[str]:
