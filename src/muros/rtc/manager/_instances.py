@@ -1,8 +1,8 @@
 """What a new instance of a component begins with: its name and its properties.
 
 Properties come from, the later over the earlier: the defaults; the component's specification; what it inherits of the
-manager's settings; what the file named by `<category>.<type>.config_file` and then `<category>.<type>.*` of rtc.conf say;
-the same for `<category>.<instance>`; the file that the request names; the request.
+manager's settings; what the file named by `<category>.<type>.config_file` and then `<category>.<type>.*` of rtc.conf
+say; the same for `<category>.<instance>`; the file that the request names; the request.
 """
 
 from __future__ import annotations
