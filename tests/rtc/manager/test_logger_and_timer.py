@@ -62,7 +62,7 @@ def test_standard_output_and_files_together(tmp_path: Path, capsys: pytest.Captu
     one.finding(Finding("c", "Foo0", "Foo0 is full", remedy="Read it", severity=Severity.ERROR))
     one.close()
     out = capsys.readouterr().out
-    assert "ERROR: findings: finding: Foo0 is full." in out
+    assert "ERROR: finding: Foo0 is full." in out
     assert (tmp_path / "a.log").read_text() == out
     one.logger.error("after the end")
     assert capsys.readouterr().out == ""

@@ -13,6 +13,7 @@ from muros.rtc.codes import LifeCycleState, ReturnCode, RtcError
 from muros.rtc.component import Component
 from muros.rtc.manager import CreateError, LimitError, Manager, ManagerEvent, ModuleError
 from muros.rtc.properties import ConfError
+from tests.rtc.manager._processes import wait_until
 from tests.rtc.manager._worlds import FakeManager, MemoryWorld, Names, manager_in
 
 
@@ -38,6 +39,7 @@ class Raising(Component):
         raise ValueError("no wheel")
 
 
+ACTIVE = LifeCycleState.ACTIVE_STATE
 Make = Callable[..., Manager]
 
 
@@ -410,6 +412,20 @@ def test_many_threads_make_different_names(make: Make) -> None:
     for thread in threads:
         thread.join(20)
     assert {component.instance_name for component in manager.components} == {f"Foo{n}" for n in range(8)}
+
+
+def test_composites_are_made_of_what_is_there(make: Make) -> None:
+    manager = make()
+    manager.start()
+    members = [manager.create_component("Foo") for _ in range(2)]
+    whole = manager.create_component(
+        "PeriodicECSharedComposite?instance_name=Whole&conf.default.members=Foo0,Foo1"
+    )
+    manager.activate("Whole")
+    context = whole.owned_contexts[0]
+    for member in members:
+        assert member.participating_contexts == (context,)
+        wait_until(lambda one=member: context.get_component_state(one.participation) is ACTIVE)  # type: ignore[misc]
 
 
 def test_start_and_use_in_the_wrong_order(make: Make) -> None:

@@ -77,7 +77,7 @@ class Log:
         """Log a finding, for `Findings.on_finding`."""
         level = SEVERITIES[finding.severity]
         if self.logger.isEnabledFor(level):
-            self.logger.getChild("findings").log(level, "%s", finding.format())
+            self.logger.getChild("finding").log(level, "%s", finding.format().removeprefix("finding: "))
 
     def close(self) -> None:
         """Write what is left and let go of the files."""
