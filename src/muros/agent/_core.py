@@ -24,7 +24,7 @@ from muros.agent._messages import (
     status,
     status_agent,
 )
-from muros.agent._proxies import ParticipantProxy
+from muros.agent._proxies import Answered, ParticipantProxy
 from muros.agent._session import AgentSession
 from muros.agent.events import (
     ClientBack,
@@ -301,7 +301,7 @@ class AgentCore(Voice[Event]):
             self._fresh.pop(session, None)
             proxies = session.objects.values()
             nodes = tuple(p.participant.name and p.detail for p in proxies if isinstance(p, ParticipantProxy))
-            kinds = [proxy.kind for proxy in proxies]
+            kinds = [proxy.kind for proxy in proxies if not isinstance(proxy, Answered)]
             self.tell(
                 ClientReady(
                     session.number,

@@ -2,6 +2,8 @@
 
 from muros.agent._events_proxy import TOPIC as EVENTS
 from muros.agent._events_proxy import EventsProxy, subject
+from muros.agent._graph_proxy import TOPIC as GRAPH
+from muros.agent._graph_proxy import GraphProxy
 from muros.agent._limits import Limits
 from muros.agent._proxies import (
     GroupProxy,
@@ -150,6 +152,8 @@ def build(
             return WriterProxy(object_id, entity, participant, topic, _qos(entity, parent))
         if isinstance(entity, DataReaderEntity):
             topic = _topic(entity, participant, objects)
+            if topic.name == GRAPH:
+                return GraphProxy(object_id, entity, participant, topic)
             if topic.name.startswith(EVENTS):
                 return _events(entity, object_id, participant, topic, objects, space)
             return ReaderProxy(object_id, entity, participant, topic, _qos(entity, parent))

@@ -7,9 +7,8 @@ them, one at once and one after each change, as fast as the client takes them.
 from collections.abc import Mapping
 from typing import Final
 
-from muros.agent._proxies import ParticipantProxy, Proxy, Readable, ReaderProxy, Reading, WriterProxy
+from muros.agent._proxies import Answered, ParticipantProxy, Proxy, ReaderProxy, Reading, WriterProxy
 from muros.space import Reader, Space, Topic, Writer
-from muros.xrce.constants import KIND_DATAREADER
 from muros.xrce.representation import Entity
 
 __all__ = ["TOPIC", "EventsProxy", "subject"]
@@ -27,11 +26,10 @@ def subject(topic: str, objects: Mapping[int, Proxy]) -> WriterProxy | ReaderPro
     return found if isinstance(found, WriterProxy | ReaderProxy) else None
 
 
-class EventsProxy(Readable):
+class EventsProxy(Answered):
     """A datareader of the events of `of`, which `objects` may have replaced since."""
 
     __slots__ = ("_changed", "_counts", "_number", "_objects")
-    kind = KIND_DATAREADER
 
     def __init__(
         self,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from muros import interfaces
 from muros.agent._calls import Call
+from muros.agent._graph_proxy import DELAY, PACE, GraphProxy
 from muros.agent._proxies import Proxy, ReaderProxy
 from muros.space import Durability, GraphEvent, Qos, Reliability, Topic
 
@@ -18,10 +19,6 @@ if TYPE_CHECKING:
 __all__ = ["GraphTopic"]
 
 TOPIC: Final = Topic("ros_to_microros_graph", "micro_ros_msgs::msg::dds_::Graph_")
-DELAY: Final = 50
-"""Milliseconds in which changes are gathered."""
-PACE: Final = 1000
-"""Bytes of the graph for which they are gathered a millisecond longer: large ones take their time."""
 LONGEST_NAME: Final = 256
 """Characters that the type leaves for a name."""
 
@@ -35,6 +32,8 @@ class GraphTopic:
 
     def made(self, proxy: Proxy) -> None:
         """A client has made something: it may be a reader of the graph."""
+        if isinstance(proxy, GraphProxy):
+            proxy.begin(self._core)
         if not isinstance(proxy, ReaderProxy) or proxy.topic != TOPIC:
             return
         assert proxy.parent is not None

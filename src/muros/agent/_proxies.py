@@ -25,6 +25,7 @@ from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableOutput
 from muros.xrce.representation import Entity
 
 __all__ = [
+    "Answered",
     "GroupProxy",
     "ParticipantProxy",
     "Proxy",
@@ -312,6 +313,13 @@ class Readable(Proxy):
     def _on_data(self, source: object) -> None:
         if self.reading is not None:
             self.reading.pump()
+
+
+class Answered(Readable):
+    """A datareader that is not in the space: the agent answers it by itself."""
+
+    __slots__ = ()
+    kind = KIND_DATAREADER
 
 
 class ReaderProxy(Readable):

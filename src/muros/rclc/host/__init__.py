@@ -9,7 +9,9 @@ there, and ``muros.rclc`` gives a program the ones that fit where it runs.
 ``groups`` ``sharing`` ``workers``                                    executors in threads of their own
 ``sense_plan_act``                                                  stages with barriers
 ``remapping`` ``parameters`` ``parameter_files`` ``logger``         arguments, parameters and levels of ROS 2
-``clock`` ``graph`` ``events`` ``expiry`` ``memory`` ``actions``    the rest, each by its name
+``graph`` ``endpoints`` ``agent_graph``                             who is there, and what an agent tells of it
+``events`` ``agent_events``                                         what becomes of publishers and subscriptions
+``clock`` ``expiry`` ``memory`` ``actions`` ``checks``              the rest, each by its name
 ``middleware``                                                      further ways into a graph
 ==================================================================  ===========================================
 """

@@ -6,19 +6,21 @@
     node.graph.wait_for_node("/talker", timeout=5.0)
     node.graph.on_change(lambda graph: print(graph.nodes()))
 
-Straight in a data space the graph is the space's own. Through an agent it is what the agent publishes, see ``graph``:
-without QoS, hashes and gids, and empty where an agent publishes none. Names given are relative to the node.
+Straight in a data space the graph is the space's own. Through an agent it is what that tells: the agent of muros all of
+it, see ``agent_graph``, that of micro-ROS what it publishes, see ``graph``, without QoS, hashes and gids; it is empty
+where an agent tells nothing. Names given are relative to the node.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from muros.rclc import graph as topic
 from muros.rclc import handles
 from muros.rclc.executor import Handle
+from muros.rclc.host import agent_graph
+from muros.rclc.host.endpoints import CLIENT, KINDS, PUBLISHER, SERVER, SUBSCRIPTION, Endpoint
 from muros.rclc.host.handles import tell_problem
 from muros.rclc.host.waiting import spin_until
 
@@ -27,35 +29,21 @@ if TYPE_CHECKING:
     from muros.rclc.host.context import Node
     from muros.xrce._types import Buffer
 
-__all__ = ["AgentGraph", "Endpoint", "Graph", "GraphSource", "GraphWatch"]
+__all__ = [
+    "CLIENT",
+    "KINDS",
+    "PUBLISHER",
+    "SERVER",
+    "SUBSCRIPTION",
+    "AgentGraph",
+    "Endpoint",
+    "Graph",
+    "GraphSource",
+    "GraphWatch",
+]
 
 NO_GRAPH: Final = 55
 """The code with which ``on_problem`` is told that a wait was in vain because an agent publishes no graph."""
-
-KINDS: Final = ("publisher", "subscription", "server", "client")
-"""What an endpoint is, in the order of the numbers of micro_ros_msgs/msg/Entity."""
-
-PUBLISHER, SUBSCRIPTION, SERVER, CLIENT = KINDS
-
-
-@dataclass(frozen=True, slots=True)
-class Endpoint:
-    """Something that a node made."""
-
-    kind: str
-    """publisher, subscription, server or client."""
-    name: str
-    """Full name of the topic or service."""
-    type: str
-    """As in ROS: std_msgs/msg/String. A DDS name that ROS has not made is left as it is."""
-    node: str
-    """Full name of the node; empty for an endpoint of none."""
-    gid: bytes = b""
-    """16 bytes; empty through an agent."""
-    qos: Any = None
-    """A ``muros.space.Qos``; None through an agent."""
-    type_hash: str = ""
-    """RIHS01_...; empty when unknown."""
 
 
 class GraphSource(Protocol):
@@ -234,7 +222,7 @@ class GraphWatch(Handle):
 
     def ready(self, now: int) -> bool:
         """Whether the graph has changed."""
-        return self.changed
+        return self._graph.changes >= 0 and self.changed  # looking for changes is what finds them
 
     def run(self, now: int) -> None:
         """Calls the callback."""
@@ -249,26 +237,59 @@ class GraphWatch(Handle):
 
 
 class AgentGraph:
-    """The graph that an agent publishes, taken by a session."""
+    """The graph that an agent tells, taken by a session: what is published for all, until more is told to us alone.
+
+    It is known when our readers stand: who has waited for it may publish at once, their making fills no window then.
+    """
 
     def __init__(self, session: Any, participant: Any, on_change: Callable[[], object]) -> None:
-        self.changes = 0
-        self.known = False
         self.malformed = 0
         self._on_change = on_change
-        self._nodes: list[str] = []
-        self._endpoints: list[Endpoint] = []
-        self._reader = session.reader(participant, topic.TOPIC, topic.TYPE, topic.QOS, self._take)
+        self._told: int | None = None  # with which creation of our reader all of it was told
+        self._news: tuple[list[str], list[Endpoint]] | None = None
+        self._graph: tuple[list[str], list[Endpoint]] = ([], [])
+        self._changes = 0
+        self._readers = [
+            session.reader(participant, topic.TOPIC, topic.TYPE, topic.QOS, self._take),
+            session.reader(participant, agent_graph.TOPIC, agent_graph.TYPE, "default", self._take_whole),
+        ]
+
+    @property
+    def changes(self) -> int:
+        """Counts changes."""
+        if self._news is not None and not any(reader.todo and not reader.status for reader in self._readers):
+            news, self._news = self._news, None
+            if not self._changes or news != self._graph:
+                self._graph = news
+                self._changes += 1
+                self._on_change()
+        return self._changes
+
+    @property
+    def known(self) -> bool:
+        """Whether anything was told."""
+        return self.changes > 0
 
     def read(self) -> tuple[list[str], list[Endpoint]]:
         """What was told last."""
-        return self._nodes, self._endpoints
+        return self._graph
 
     def close(self) -> None:
         """Listens no more."""
-        self._reader.destroy()
+        for reader in self._readers:
+            reader.destroy()
+
+    def _take_whole(self, buf: Buffer, off: int, n: int) -> None:
+        try:
+            self._news = agent_graph.read_untrusted(bytes(memoryview(buf)[off : off + n]))
+        except ValueError:
+            self.malformed += 1
+        else:
+            self._told = self._readers[1].request
 
     def _take(self, buf: Buffer, off: int, n: int) -> None:
+        if self._told == self._readers[1].request:
+            return  # and not by an agent before this one, of another kind
         nodes: list[str] = []
         endpoints: list[Endpoint] = []
 
@@ -282,12 +303,8 @@ class AgentGraph:
             topic.read_untrusted(buf, off, n, visit)
         except ValueError:
             self.malformed += 1
-            return
-        if not self.known or (nodes, endpoints) != (self._nodes, self._endpoints):
-            self.known = True
-            self._nodes, self._endpoints = nodes, endpoints
-            self.changes += 1
-            self._on_change()
+        else:
+            self._news = nodes, endpoints
 
 
 def _types(endpoints: Iterable[Endpoint]) -> dict[str, list[str]]:
