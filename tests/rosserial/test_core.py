@@ -652,6 +652,27 @@ def test_a_line_that_is_always_too_slow_carries_what_is_new() -> None:
     assert max(ages[len(ages) // 4 :]) <= 60
 
 
+def test_a_board_may_read_what_is_said_of_it() -> None:
+    """A line too slow for /rosout is said on /rosout."""
+    scene = Scene()
+    board = RosLib(scene)
+    board.subscriber("rosout", "rcl_interfaces/Log")
+    for name in ("a", "b", "c"):
+        board.subscriber(name, "std_msgs/Byte")
+    writers = [scene.writer(f"/{name}", BYTE) for name in ("a", "b", "c")]
+    board.plug()
+    scene.step(400)
+    board.taken(101)
+    scene.link.waiting = 100
+    for _ in range(300):
+        for write in writers:
+            write(data=1)
+        scene.step()
+    scene.link.waiting = 0
+    scene.step(30)
+    assert any(b"newer ones came" in body for body in board.taken(101))
+
+
 def test_latched_messages_all_come_however_slow_the_line() -> None:
     """They replace each other nowhere: each transform of /tf_static is another one."""
     scene = Scene(baud=9_600)
@@ -753,6 +774,22 @@ def test_the_server_says_goodbye() -> None:
     scene.step(1)
     assert board.taken(ID_TX_STOP) == [b""]
     assert not board.connected
+
+
+@pytest.mark.parametrize("waiting", [0, 5_000])
+def test_the_goodbye_waits_for_nothing(waiting: int) -> None:
+    """The lines are closed soon."""
+    scene = Scene(baud=9_600)
+    board = RosLib(scene)
+    board.subscriber("text", "std_msgs/String")
+    board.plug()
+    scene.step(1_000)
+    write = scene.writer("/text", STRING)
+    for _ in range(20):
+        write(data="x" * 480)
+    scene.link.waiting = waiting
+    scene.core.stop()
+    assert scene.link.sent[-1] == frame(ID_TX_STOP, b"")
 
 
 def test_nothing_comes_after_the_goodbye() -> None:

@@ -9,7 +9,8 @@ and no sign of a restart. So the server goes by these:
   second.
 - A connected board passes over the two bytes ``FF 00``; an unconnected one answers with a request for the time, to show
   which version it speaks. While a board shows no sign it gets them twice a second, and a request for the time that
-  is not due means that it has started again.
+  is not due means that it has started again. Boards of Groovy show nothing of the kind; one that has sent nothing for a
+  while is asked for its topics, and nothing goes to it until it has named them.
 - A frame of an unknown topic means that something was lost, or that the board has started again with other topics.
 - Topics that stay unnamed after two requests are gone. Damage on the line while they are named brings other requests,
   and then one that was named after any of them is there.
@@ -228,7 +229,7 @@ class Board:
     def stop(self) -> None:
         """Tells the board that nobody listens any more, so that it waits to be asked."""
         if self.state != AWAY and self.version:
-            self.output.end(frame(ID_TX_STOP, b"", self.version), self.core.clock())
+            self.output.end(frame(ID_TX_STOP, b"", self.version))
 
     def close(self) -> None:
         """Takes everything of it out of the world."""

@@ -92,12 +92,11 @@ class Output:
         self._full_since = None
         self._ended = False
 
-    def end(self, frame: bytes, now: int) -> None:
-        """Sends a last frame; nothing goes after it until `clear`."""
+    def end(self, frame: bytes) -> None:
+        """Hands over a last frame, whatever is on the line; nothing goes after it until `clear`."""
         self._urgent.clear()
-        self._urgent.append(frame)
         self._ended = True
-        self.pump(now)
+        self._hand_over([frame], len(frame))
 
     def pump(self, now: int) -> int | None:
         """Sends what can be sent at ``now``; returns when to call again if something is left."""
@@ -111,19 +110,22 @@ class Output:
                     self._full_since = now
                 return now + _POLL
             if self._full_since is not None and now - self._full_since >= _STALL:
-                for source in ready:
+                for source in tuple(ready):
                     source.hurry()
             batch, n = self._batch(now, now_us)
             if not batch:
                 break
             self._free_us = max(self._free_us, now_us) + n * self.byte_us * _SLACK
-            if self.link.send(batch[0] if len(batch) == 1 else b"".join(batch), self.address):
-                self.frames += len(batch)
-                self.bytes += n
-            else:
-                self.dropped += len(batch)
+            self._hand_over(batch, n)
         self._full_since = None
         return None
+
+    def _hand_over(self, batch: list[bytes], n: int) -> None:
+        if self.link.send(batch[0] if len(batch) == 1 else b"".join(batch), self.address):
+            self.frames += len(batch)
+            self.bytes += n
+        else:
+            self.dropped += len(batch)
 
     def _batch(self, now: int, now_us: int) -> tuple[list[bytes], int]:
         """The next frames to send, and their bytes: as many as are worth one call, and the line is free for."""
