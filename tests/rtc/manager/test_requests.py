@@ -39,6 +39,7 @@ def test_every_part_of_a_request() -> None:
         ("XYZ:a:b:c:d:e", "is no component id"),
         ("Foo?a", "'Foo[?]a': 'a' is no key=value"),
         ("Foo?=b", "'Foo[?]=b': no key before '=b'"),
+        ("Foo?instance_name=a\nERROR: x", "control characters have no place in a request"),
         ("a" * 65537, "a request of 65537 characters; at most 65536 are read"),
     ],
 )

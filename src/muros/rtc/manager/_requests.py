@@ -87,7 +87,7 @@ class ConnectRequest:
 
 def parse_create_untrusted(text: str) -> CreateRequest:
     """A request to create a component. Raises RequestError, nothing else."""
-    _check_length(text)
+    _check(text)
     name, _, options = text.strip().partition("?")
     if not name:
         raise RequestError(f"{text!r} names no component; write Type?key=value&key=value")
@@ -113,7 +113,7 @@ def parse_connect_untrusted(text: str) -> ConnectRequest:
 
     Keys are those of a connector without `dataport.`; those of the publisher may be written short.
     """
-    _check_length(text)
+    _check(text)
     first, _, options = text.strip().partition("?")
     ports, properties = (
         [first.strip()],
@@ -147,6 +147,8 @@ def _options(text: str, whole: str) -> list[tuple[str, str]]:
     return pairs
 
 
-def _check_length(text: str) -> None:
+def _check(text: str) -> None:
     if len(text) > REQUEST_LENGTH:
         raise RequestError(f"a request of {len(text)} characters; at most {REQUEST_LENGTH} are read")
+    if not text.isprintable():  # names come into logs and onto terminals
+        raise RequestError(f"{text!r}: control characters have no place in a request")
