@@ -62,13 +62,13 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built
 
 
-def test_wheel_holds_the_package_and_nothing_else(wheel: Path) -> None:
+def test_wheel_holds_what_is_in_src_and_nothing_else(wheel: Path) -> None:
     assert wheel.name == f"muros-{muros.__version__}-py3-none-any.whl"
     info = f"muros-{muros.__version__}.dist-info/"
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if not name.startswith(info)}
         licence = archive.read(f"{info}licenses/LICENSE")
-    tracked = {path.removeprefix("src/") for path in _files() if path.startswith("src/muros/")}
+    tracked = {path.removeprefix("src/") for path in _files() if path.startswith("src/")}
     assert names == tracked
     assert "muros/py.typed" in names
     assert licence == (ROOT / "LICENSE").read_bytes()
