@@ -378,7 +378,7 @@ def test_the_end_takes_everything_back(make: Make) -> None:
     manager = make(world)
     manager.start()
     components = [manager.create_component("Foo") for _ in range(3)]
-    assert len(world.managers["localhost:2810"].known_slaves) == 1
+    wait_until(lambda: len(world.managers["localhost:2810"].known_slaves) == 1)
     manager.close()
     assert all(not component.is_initialized for component in components)
     assert world.server.bound == {}

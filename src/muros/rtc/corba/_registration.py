@@ -22,7 +22,7 @@ from muros.rtc.corba._naming import Names, NameServer, _quoted, is_same, lives, 
 from muros.rtc.corba._orb import Orb
 from muros.rtc.reports import Reporter
 
-__all__ = ["Registration"]
+__all__ = ["Registration", "patience"]
 
 NAME_TIMEOUT: Final = 2.0
 """Seconds that one question to a name server may take."""
@@ -79,7 +79,7 @@ class Registration:
 
     def update(self) -> None:
         """Bind what servers lack."""
-        with _patience(NAME_TIMEOUT):
+        with patience(NAME_TIMEOUT):
             self._names.update()
             with self._lock:
                 waiting = dict(self._waiting)
@@ -132,7 +132,7 @@ class Registration:
     @contextlib.contextmanager
     def _noted(self, server: NameServer) -> Iterator[None]:
         """Around questions to a server: a silent one is left alone for a while, what it refuses is passed over."""
-        with _patience(NAME_TIMEOUT):
+        with patience(NAME_TIMEOUT):
             try:
                 yield
             except PeerLostError:
@@ -145,7 +145,7 @@ class Registration:
 
         def made() -> None:
             begin = time.monotonic()
-            with _patience(NAME_TIMEOUT):
+            with patience(NAME_TIMEOUT):
                 change()
             if time.monotonic() - begin >= NAME_TIMEOUT:  # one was silent; which one, only `Names` knows
                 self._silent.update(dict.fromkeys((one.address for one in self.servers), time.monotonic()))
@@ -164,7 +164,7 @@ class Registration:
 
 
 @contextlib.contextmanager
-def _patience(seconds: float) -> Iterator[None]:
+def patience(seconds: float) -> Iterator[None]:
     """Calls of this thread to other processes take no longer than that, inside the block."""
     omniORB.setClientThreadCallTimeout(round(seconds * 1000))
     try:

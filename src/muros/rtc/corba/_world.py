@@ -12,7 +12,7 @@ from muros.rtc.corba._manager import ManagerServant, PeerManager
 from muros.rtc.corba._naming import NameServer
 from muros.rtc.corba._orb import Orb, current_orb, start_orb
 from muros.rtc.corba._organization import ForeignMember
-from muros.rtc.corba._registration import Registration
+from muros.rtc.corba._registration import Registration, patience
 from muros.rtc.corba._setup import set_up
 from muros.rtc.corba._stubs import RTC, RTM
 from muros.rtc.properties import Properties
@@ -31,6 +31,10 @@ DEFAULT_KEY: Final = "manager"
 
 MASTER_PORT: Final = 2810
 """TCP port of a master manager whose address has none."""
+
+
+MANAGER_TIMEOUT: Final = 2.0
+"""Seconds within which a manager says that it is one."""
 
 
 class CorbaWorld:
@@ -100,7 +104,7 @@ class CorbaWorld:
 
     def manager_at(self, address: str) -> PeerManager:
         reference = self.orb.to_reference(_manager_location(address))
-        with peer(f"the manager at {address}"):
+        with peer(f"the manager at {address}"), patience(MANAGER_TIMEOUT):
             manager = reference._narrow(RTM.Manager) if reference is not None else None
         if manager is None:
             raise RtcError(f"{address} is no manager")

@@ -63,9 +63,8 @@ class Colleagues:
         return tuple(self._slaves)
 
     def begin(self, own: Reference) -> None:
-        """`own` is how others are told of this manager. A slave looks for its master."""
+        """`own` is how others are told of this manager."""
         self._own = own
-        self.find_master()
 
     def find_master(self) -> None:
         """Report to the master of `corba.master_manager` if it is there and does not know this one. Raises nothing."""
@@ -104,6 +103,7 @@ class Colleagues:
     def instance_names(self) -> set[str]:
         """The names of all components of this node: of the master and all its slaves, or of one's own slaves."""
         names = set[str]()
+        self.find_master()
         for other in self.masters or self.slaves:
             names |= self.ask(other, lambda one: one.instance_names(), set())
         return names

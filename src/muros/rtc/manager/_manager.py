@@ -164,8 +164,10 @@ class Manager:
             if self.is_master and self.settings.flag("naming.enable"):
                 world.bind(self._names_of_manager(), own)
             self._colleagues.begin(own)
-            if not self.is_master and self.settings.flag("corba.update_master_manager.enable"):
-                self._every("corba.update_master_manager.interval", self._colleagues.find_master)
+            if not self.is_master:
+                self.timer.after(0, self._colleagues.find_master)  # it may be far away, or silent
+                if self.settings.flag("corba.update_master_manager.enable"):
+                    self._every("corba.update_master_manager.interval", self._colleagues.find_master)
         if self.settings.flag("naming.enable") and self.settings.flag("naming.update.enable"):
             self._every("naming.update.interval", world.update_names)
             self._every("naming.update.interval", self._topics.update)
