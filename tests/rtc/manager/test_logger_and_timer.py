@@ -26,6 +26,7 @@ def test_a_line(tmp_path: Path) -> None:
     one.logger.info("plain")
     one.close()
     first, second = (tmp_path / "Rtc4711.log").read_text().splitlines()
+    assert logging.getLevelName(logging.WARNING) == "WARNING"  # others' logs stay as they are
     assert re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3} WARN: Foo0: 3 left", first)
     assert second.endswith(" INFO: manager: plain")
 

@@ -36,6 +36,8 @@ LEVELS: Final[Mapping[str, int]] = {
 }
 """Names of levels as `logger.log_level` has them. SILENT lets nothing through."""
 
+_NAMES: Final = {number: name for name, number in LEVELS.items()}
+
 SEVERITIES: Final = {
     Severity.INFO: logging.INFO,
     Severity.WARNING: logging.WARNING,
@@ -62,8 +64,6 @@ class Log:
                 handler = _open(expand(name, fields, os.environ if environment is None else environment))
                 handler.setFormatter(form)
                 self._handlers.append(handler)
-        for name, value in LEVELS.items():
-            logging.addLevelName(value, name)
         for handler in self._handlers:
             handler.setLevel(level)
             self.logger.addHandler(handler)
@@ -102,7 +102,7 @@ class _LineFormatter(logging.Formatter):
     """`Nov 21 23:10:15 INFO: Foo0: message`; the date is that of `logger.date_format`, `%Q` in it milliseconds."""
 
     def __init__(self, date_format: str) -> None:
-        super().__init__("%(asctime)s %(levelname)s: %(source)s: %(message)s")
+        super().__init__("%(asctime)s %(level)s: %(source)s: %(message)s")
         self._date_format = date_format or "%b %d %H:%M:%S"
 
     def formatTime(self, record: logging.LogRecord, datefmt: str | None = None) -> str:  # noqa: N802
@@ -110,6 +110,8 @@ class _LineFormatter(logging.Formatter):
         return time.strftime(form, time.localtime(record.created))
 
     def format(self, record: logging.LogRecord) -> str:
+        # Names of levels are the process's; only these lines have those of the RTC world.
+        record.level = _NAMES.get(record.levelno, record.levelname)
         record.source = record.name.removeprefix(LOGGER_NAME).lstrip(".") or "manager"
         return super().format(record)
 
