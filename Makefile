@@ -22,7 +22,7 @@ test: setup ## Everything: lint, types, layers, all tests on CPython and MicroPy
 lint: setup ## Style, formatting, types and the order of the rooms
 	@failed=; run() { echo "== $$*"; $(BIN)/"$$@" || failed=1; }; \
 	run ruff check --quiet --output-format concise .; \
-	run ruff format --quiet --check --output-format concise .; run mypy --no-error-summary $(wildcard src/muros tests tools bench examples); \
+	run ruff format --quiet --check --output-format concise .; run mypy --no-error-summary $(wildcard src tests tools bench examples); \
 	run lint-imports --no-logo; test -z "$$failed"
 
 unit: setup ## All tests (PYTEST_ARGS="tests/xrce -k stream" chooses)
