@@ -80,6 +80,18 @@ def test_listing_runs_nothing(folder: Path) -> None:
     assert not mark.exists()
 
 
+def test_a_file_is_read_again_when_it_has_changed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    known = modules(folder)
+    before = known.loadable()
+    with monkeypatch.context() as patched:
+        patched.setattr("ast.parse", lambda source: pytest.fail("it has not changed"))
+        assert known.loadable() == before
+    (folder / "OldStyle.py").write_text(OLD.replace('"AIST"', '"somebody else"'))
+    (folder / "NewStyle.py").unlink()
+    (changed,) = known.loadable()
+    assert changed["vendor"] == "somebody else"
+
+
 def test_what_is_read_of_a_class_is_what_it_says_itself(folder: Path) -> None:
     loaded = modules(folder).load("NewStyle")
     (said,) = read_specs_untrusted(folder / "NewStyle.py")

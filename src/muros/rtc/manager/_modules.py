@@ -56,6 +56,8 @@ class Modules:
         self._properties = properties
         self._folder = folder
         self._loaded: dict[Path, LoadedModule] = {}
+        self._specs: dict[Path, tuple[tuple[int, int], list[dict[str, str]]]] = {}
+        """What files hold, by their time and size."""
 
     @property
     def loaded(self) -> tuple[LoadedModule, ...]:
@@ -120,12 +122,25 @@ class Modules:
         return loaded
 
     def loadable(self) -> list[dict[str, str]]:
-        """The properties of every component that could be loaded. No file is run in this process."""
+        """The properties of every component that could be loaded. No file is run in this process.
+
+        A file is read again when it has changed.
+        """
         from muros.rtc.manager._spec_files import read_specs_untrusted
 
-        found = []
+        found, known = [], self._specs
+        self._specs = {}
         for path in self._files():
-            for spec in read_specs_untrusted(path):
+            try:
+                status = path.stat()
+            except OSError:
+                continue
+            edition = (status.st_mtime_ns, status.st_size)
+            before, specs = known.get(path, (None, []))
+            if before != edition:
+                specs = read_specs_untrusted(path)
+            self._specs[path] = edition, specs
+            for spec in specs:
                 found.append({**spec, "module_file_name": path.name, "module_file_path": str(path)})
         return found
 

@@ -22,7 +22,7 @@ __all__ = ["read_specs_untrusted"]
 FILE_SIZE: Final = 1 << 20
 """Octets of the largest file that is looked at."""
 
-ASK_TIME: Final = 10.0
+ASK_TIME: Final = 3.0
 """Seconds that importing a file in another process may take."""
 
 CLASS_KEYS: Final = (
