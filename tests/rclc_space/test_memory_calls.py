@@ -183,8 +183,8 @@ def test_rules_for_nothing_leave_nothing_behind(stage: Stage) -> None:
             lambda: node.action_server(Fibonacci, "a", print, memory=rules),
             "Fibonacci_SendGoal_Request has no",
         ),
-        (lambda: node.action_client(Fibonacci, "a", memory=rules), "action client 'a' takes no string"),
-        (lambda: node.parameters(memory=rules), "a server of parameters takes no string or seq.* 'nothing'"),
+        (lambda: node.action_client(Fibonacci, "a", memory=rules), "action client 'a' has no string"),
+        (lambda: node.parameters(memory=rules), "a server of parameters has no string or seq.* 'nothing'"),
     ):
         with pytest.raises(ValueError, match=text) as caught:
             make()
@@ -209,7 +209,7 @@ def test_what_are_no_rules(arguments: Any) -> None:
 def test_sizes_are_those_of_rules_that_fit() -> None:
     rules = Rules({"date": 5})
     for say in (rules.capacities, rules.size, rules.static_size, rules.longest):
-        with pytest.raises(ValueError, match="std_msgs/msg/String takes no string or sequence 'date'"):
+        with pytest.raises(ValueError, match="std_msgs/msg/String has no string or sequence 'date'"):
             say(String)
 
 

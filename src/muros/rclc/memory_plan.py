@@ -74,7 +74,7 @@ def divide(rules: "Rules", what: str, kinds: "Sequence[Any]") -> "list[Rules]":
         made.append(type(rules)(mine, rules.strings, rules.messages, rules.numbers))
     for path in rules.rules:
         if what and path not in known:
-            raise RulesError("%s takes no string or sequence %r" % (what, path))
+            raise RulesError("%s has no string or sequence %r" % (what, path))
     return made
 
 
