@@ -146,7 +146,7 @@ class FakeManager:
 
     def components_by_name(self, name: str) -> Sequence[object]:
         self._answer()
-        return [f"{name} of {self._name}"]
+        return [f"{name} of {self._name}"] if name.rpartition("/")[2] in self.names else []
 
     def add_slave(self, slave: object) -> ReturnCode:
         self._answer()

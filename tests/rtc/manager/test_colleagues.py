@@ -43,8 +43,9 @@ def test_a_master_lets_its_slaves_work(tmp_path: Path) -> None:
         assert master.create("Foo?manager_name=c&x=y") == ("made", "Foo?x=y")
         assert slave.made == ["Foo?instance_name=F", "Foo?x=y"]
         assert master.colleagues.gather("get_components") == ["get_components of a", "get_components of c"]
-        assert master.colleagues.components_by_name("N") == ["N of a", "N of c"]
         slave.names = {"F"}
+        assert master.colleagues.components_by_name("*/F") == ["*/F of c"]
+        assert master.create("Foo?instance_name=F") == "*/F of c"
         assert master.colleagues.instance_names() == {"F"}
         assert master.delete_component("F") is ReturnCode.RTC_OK
         assert master.delete_component("F") is ReturnCode.BAD_PARAMETER
@@ -52,6 +53,21 @@ def test_a_master_lets_its_slaves_work(tmp_path: Path) -> None:
         assert master.colleagues.remove_slave(slave) is ReturnCode.BAD_PARAMETER
         with pytest.raises(RtcError, match="none of the 1 slave managers could make Foo; see their logs"):
             master.create("Foo")
+
+
+def test_a_slave_asks_its_master_for_another_slave(tmp_path: Path) -> None:
+    world = MemoryWorld()
+    with manager_in(tmp_path, world, manager__shutdown_on_nortcs="NO") as slave:
+        slave.register(Foo)
+        slave.start()
+        with pytest.raises(RtcError, match=r"^Foo[?]manager_name=left: there is no master manager$"):
+            slave.create("Foo?manager_name=left")
+        master = world.managers["localhost:2810"] = FakeManager("master")
+        assert slave.create("Foo?manager_name=left") == ("made", "Foo?manager_name=left")
+        assert master.made == ["Foo?manager_name=left"]
+        assert slave.components == ()
+        slave.create("Foo?manager_name=manager")
+        assert len(slave.components) == 1
 
 
 def test_a_manager_by_its_address(tmp_path: Path) -> None:

@@ -155,6 +155,20 @@ class Colleagues:
             raise RtcError(f"the slave manager could not make {request}; see its log")
         return made
 
+    def ask_master(self, request: str) -> Reference:
+        """Let the master see to a component of another manager. RtcError where there is none, or it could not."""
+        self.find_master()
+        for master in self.masters:
+            made: Reference | None = self.ask(master, lambda one: one.create_component(request), None)
+            if made is not None:
+                return made
+        told = (
+            "the master manager could not make it; see its log"
+            if self.masters
+            else "there is no master manager"
+        )
+        raise RtcError(f"{request}: {told}")
+
     def start(self, name: str, language: str) -> RemoteManager:
         """Start a slave process and wait until it has reported. RtcError where it does not."""
         process = subprocess.Popen(

@@ -325,7 +325,8 @@ class Manager:
     def create(self, request: str) -> Component | Reference:
         """A component after a request such as `Foo?instance_name=Left`: of this process, or of another manager's.
 
-        A master lets a slave make it; `manager_name` and `manager_address` in the request say which manager is to.
+        A master lets a slave make it; `manager_name` and `manager_address` in the request say which manager is to:
+        a slave asks its master for another one.
         CreateError where it cannot be made.
         """
         parsed = parse_create_untrusted(request)
@@ -336,9 +337,15 @@ class Manager:
             if made is None:
                 raise CreateError(f"{request}: the manager at {address} could not make it; see its log")
             return made
-        if self.is_master or (name and name != self.name):
+        if self.is_master:
+            asked = parsed.properties.get("instance_name", "")
+            standing = self.colleagues.components_by_name(f"*/{asked}") if asked else ()
+            if standing:
+                return standing[0]
             language = parsed.id.language or self.settings["manager.language"]
             return self.colleagues.create(_without(parsed), name=name, language=language)
+        if name not in ("", self.name, self.settings["manager.name"]):
+            return self.colleagues.ask_master(request)
         return self.create_component(parsed)
 
     def create_component(self, request: str | CreateRequest) -> Component:
