@@ -28,7 +28,7 @@ class ForeignComponent:
     def __init__(self, reference: Any, objects: Objects) -> None:
         self.reference: Final = reference
         self._objects = objects
-        self._hash = int(reference._hash(0x7FFFFFFF))
+        self._hash = objects.orb.hash_of(reference)
         self._name: str | None = None
         self._component: Any = None
         self._flow: Any = None
@@ -120,7 +120,7 @@ class ForeignContext(ExecutionContext):
         super().__init__(name="a context of another process")
         self.reference: Final = reference
         self._objects = objects
-        self._hash = int(reference._hash(0x7FFFFFFF))
+        self._hash = objects.orb.hash_of(reference)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, ForeignContext) and is_same(self.reference, other.reference)

@@ -11,6 +11,7 @@ from muros.rtc.codes import ReturnCode, RtcError
 from muros.rtc.corba._conversion import to_nv_list, to_return_code
 from muros.rtc.corba._lost import peer
 from muros.rtc.corba._naming import is_same
+from muros.rtc.corba._orb import current_orb
 from muros.rtc.corba._stubs import RTC, RTM, RTM__POA
 
 if TYPE_CHECKING:
@@ -165,7 +166,7 @@ class PeerManager:
         return isinstance(other, PeerManager) and is_same(self._reference, other._reference)
 
     def __hash__(self) -> int:
-        return hash(self._reference._hash(0x7FFFFFFF))
+        return current_orb().hash_of(self._reference)
 
     @property
     def reference(self) -> Any:

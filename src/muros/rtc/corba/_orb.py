@@ -10,13 +10,15 @@ Calls to other processes end after `call_timeout` and connecting after `connect_
 
 from __future__ import annotations
 
-import logging
 import os
 import threading
 from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
+from omniORB import CORBA
+
 from muros.rtc.codes import RtcError
+from muros.rtc.corba._adapter import Adapter, Place, object_key
 
 __all__ = ["Orb", "current_orb", "endpoint_arguments", "start_orb"]
 
@@ -29,7 +31,6 @@ CONNECT_TIMEOUT: Final = 3.0
 MAX_MESSAGE: Final = 64 << 20
 """Octets of the largest message sent or taken. omniORB's own limit is 2 MiB, less than a camera's image."""
 
-_log = logging.getLogger(__name__)
 _lock = threading.Lock()
 _current: Orb | None = None
 
@@ -48,8 +49,6 @@ def start_orb(
     ORB, as in `corba.args`, and win. RtcError if an endpoint cannot be opened or an argument is unknown.
     """
     global _current
-    from omniORB import CORBA
-
     with _lock:
         if _current is not None and not _current.is_shut_down:
             return _current
@@ -66,9 +65,8 @@ def start_orb(
             *arguments,
             *endpoint_arguments(endpoints),
         ]
-        os.environ.setdefault(
-            "OMNIORB_CONFIG", os.devnull
-        )  # what a machine has set up for others is not for us
+        # What a machine has set up for others is not for us.
+        os.environ.setdefault("OMNIORB_CONFIG", os.devnull)
         orb = None
         try:
             orb = CORBA.ORB_init(command, CORBA.ORB_ID)
@@ -83,7 +81,7 @@ def start_orb(
                 f"the ORB does not start with endpoints {endpoints!r} and arguments {list(arguments)}: {error!r}. "
                 "Is another program on that port?"
             ) from error
-        _current = Orb(orb, poa, keyed)
+        _current = Orb(orb, Adapter(poa, keyed))
         return _current
 
 
@@ -116,13 +114,10 @@ def endpoint_arguments(endpoints: str | Iterable[str]) -> list[str]:
 class Orb:
     """The running ORB. Made by `start_orb`; may be used from any thread."""
 
-    def __init__(self, orb: Any, poa: Any, keyed: Any) -> None:
+    def __init__(self, orb: Any, adapter: Adapter) -> None:
         self._orb = orb
-        self._poa = poa
-        self._keyed = keyed
-        self._lock = threading.Lock()
-        self._active: dict[Any, tuple[bytes, bytes | None]] = {}
-        """For each servant: its id among all, and among those with keys."""
+        self._adapter = adapter
+        self._ending = threading.Lock()
         self._ended = threading.Event()
         self._begun = self._destroyed = False
 
@@ -134,51 +129,26 @@ class Orb:
     @property
     def servants(self) -> tuple[Any, ...]:
         """What is active, for tests and for those who look for leaks."""
-        with self._lock:
-            return tuple(self._active)
+        return self._adapter.servants
 
     def activate(self, servant: Any, key: str = "") -> Any:
         """Let other processes call `servant`; the reference to it. With `key`, by `corbaloc::HOST:PORT/KEY`, too.
 
         A key taken by another object goes to this one.
         """
-        from omniORB import PortableServer
-
-        with self._lock:
-            if servant in self._active:
-                return self._poa.id_to_reference(self._active[servant][0])
-            name = key.encode() if key else None
-            number = self._poa.activate_object(servant)
-            if name is not None:
-                try:
-                    self._keyed.activate_object_with_id(name, servant)
-                except PortableServer.POA.ObjectAlreadyActive:
-                    for other, (one, its_name) in self._active.items():
-                        if its_name == name:
-                            self._active[other] = (one, None)
-                    self._keyed.deactivate_object(name)
-                    try:
-                        self._keyed.activate_object_with_id(name, servant)
-                    except PortableServer.POA.ObjectAlreadyActive:  # still busy with a call
-                        _log.warning("corbaloc key %s stays with the object that has it", key)
-                        name = None
-            self._active[servant] = (number, name)
-            return self._poa.id_to_reference(number)
+        return self._adapter.activate(servant, key)
 
     def deactivate(self, servant: Any) -> None:
-        """Take `servant` away: from now on its callers are told that it does not exist. Twice is allowed."""
-        from omniORB import CORBA, PortableServer
+        """Take `servant` away: from now on its callers are told that it does not exist. Twice is allowed.
 
-        with self._lock:
-            number, name = self._active.pop(servant, (None, None))
-        if number is None or self.is_shut_down:
-            return
-        for poa, one in ((self._poa, number), (self._keyed, name)):
-            if one is not None:
-                try:
-                    poa.deactivate_object(one)
-                except (CORBA.Exception, PortableServer.POA.ObjectNotActive):
-                    _log.debug("object %r had gone already", one, exc_info=True)
+        The caller lets go of the servant, too (`_adapter.py` says why).
+        """
+        if not self.is_shut_down:
+            self._adapter.deactivate(servant)
+
+    def reserve(self, servant: Any) -> Place:
+        """A reference for `servant` that stays the same while it comes and goes."""
+        return self._adapter.reserve(servant)
 
     def is_local(self, reference: Any) -> bool:
         """Whether `reference` leads to an object of this process."""
@@ -186,14 +156,11 @@ class Orb:
 
     def servant_of(self, reference: Any) -> Any | None:
         """The servant behind `reference`, made with its key or without, if it is of this process and active."""
-        from omniORB import CORBA, PortableServer
+        return self._adapter.find(reference)
 
-        for poa in (self._poa, self._keyed):
-            try:
-                return poa.reference_to_servant(reference)
-            except (CORBA.Exception, PortableServer.POA.WrongAdapter, PortableServer.POA.ObjectNotActive):
-                continue
-        return None
+    def hash_of(self, reference: Any) -> int:
+        """A hash of what `reference` leads to: the same for all references to it."""
+        return hash(object_key(self.to_text(reference)))
 
     def to_text(self, reference: Any) -> str:
         """The reference as `IOR:...`."""
@@ -205,8 +172,6 @@ class Orb:
 
         Nobody is called, but for a `corbaname`. RtcError for any other text.
         """
-        from omniORB import CORBA
-
         try:
             return self._orb.string_to_object(text.strip())
         except (CORBA.Exception, UnicodeError, ValueError) as error:
@@ -222,11 +187,8 @@ class Orb:
         Called by one of those, it only begins the end; whoever `wait`s for it calls `shutdown` again.
         """
         global _current
-        from omniORB import CORBA
-
         self._ended.set()
-        with self._lock:
-            self._active.clear()
+        with self._ending:
             if self._destroyed:
                 return
             try:
@@ -237,6 +199,7 @@ class Orb:
                     self._orb.shutdown(False)
                 return
             self._destroyed = True
+        self._adapter.close()
         with _lock:
             if _current is self:
                 _current = None

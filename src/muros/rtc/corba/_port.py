@@ -85,13 +85,13 @@ class ForeignPort:
     def __init__(self, reference: Any, objects: Objects) -> None:
         self.reference: Final = reference
         self._objects = objects
-        self._hash = reference._hash(0x7FFFFFFF)
+        self._hash = objects.orb.hash_of(reference)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, ForeignPort) and is_same(self.reference, other.reference)
 
     def __hash__(self) -> int:
-        return int(self._hash)
+        return self._hash
 
     def notify_connect(self, profile: ConnectorProfile) -> tuple[ReturnCode, ConnectorProfile]:
         with peer(str(self)):

@@ -7,7 +7,6 @@ ORB has been started.
 from __future__ import annotations
 
 import contextlib
-import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
@@ -96,32 +95,21 @@ class _Offered:
     """A servant with a reference that stays the same while it comes and goes."""
 
     def __init__(self, orb: Orb, servant: Any) -> None:
-        self._orb = orb
-        self._servant = servant
-        self._lock = threading.Lock()
-        self._active = False
         try:
-            made = orb._poa.create_reference(servant._NP_RepositoryId)
-            self._id = orb._poa.reference_to_id(made)
-            self.reference: Final = orb.to_text(made)
+            self._place = orb.reserve(servant)
+            self.reference: Final = orb.to_text(self._place.reference)
         except CORBA.SystemException as error:
             raise RtcError(f"no reference can be made: {describe(error)}") from error
 
     def activate(self) -> None:
-        with self._lock:
-            if not self._active:
-                try:
-                    self._orb._poa.activate_object_with_id(self._id, self._servant)
-                except CORBA.SystemException as error:
-                    raise RtcError(f"a provider cannot be activated: {describe(error)}") from error
-                self._active = True
+        try:
+            self._place.activate()
+        except CORBA.SystemException as error:
+            raise RtcError(f"a provider cannot be activated: {describe(error)}") from error
 
     def deactivate(self) -> None:
-        with self._lock:
-            if self._active:
-                self._active = False
-                with contextlib.suppress(CORBA.SystemException, PortableServer.POA.ObjectNotActive):
-                    self._orb._poa.deactivate_object(self._id)  # the ORB may have ended before
+        with contextlib.suppress(CORBA.SystemException):  # the ORB may have ended before
+            self._place.deactivate()
 
 
 def _may_be(found: Any, interface: Any) -> bool:

@@ -244,7 +244,7 @@ class _Offer:
     """The side that is called."""
 
     def __init__(self, orb: Orb, end: _End, name: str) -> None:
-        self._end = end
+        self._end: _End | None = end
         self._offer = CorbaOffer(orb, end, OpenRTM.PortSharedMemory, name, True)
 
     @property
@@ -254,8 +254,10 @@ class _Offer:
 
     def close(self) -> None:
         """Take the object and the block away."""
-        self._offer.close()
-        self._end.end()
+        end, self._end = self._end, None
+        if end is not None:
+            self._offer.close()
+            end.end()
 
 
 class _Line:
@@ -265,20 +267,22 @@ class _Line:
         self._connection = connection
         self._orb = orb
         self._peer = reference_in(connection.profile, name, OpenRTM.PortSharedMemory, orb)
-        self._end = _End(connection, orb, size)
+        self._end: _End | None = _End(connection, orb, size)
         self._end.peer = self._peer
         own = orb.activate(self._end)._narrow(OpenRTM.PortSharedMemory)
         try:
             self._peer.setInterface(own)
             self._peer.setEndian(connection.little)
         except CORBA.Exception as error:
-            orb.deactivate(self._end)
+            self.close()
             raise TransportError(f"{name}: the peer's object does not answer: {describe(error)}") from error
 
     def put(self, octets: bytes) -> PortStatus:
         """Place the value and signal."""
+        end = self._end
         try:
-            return _STATUS[self._peer.put()._v] if self._end.place(octets) else PortStatus.PORT_ERROR
+            placed = end is not None and end.place(octets)
+            return _STATUS[self._peer.put()._v] if placed else PortStatus.PORT_ERROR
         except CORBA.Exception as error:
             return self._failed(error)
 
@@ -290,13 +294,16 @@ class _Line:
             return self._failed(error), b""
         if status is not PortStatus.PORT_OK:
             return status, b""
-        octets = self._end.received()
+        end = self._end
+        octets = end.received() if end is not None else None
         return (PortStatus.PORT_ERROR, b"") if octets is None else (status, octets)
 
     def close(self) -> None:
         """Take the own object and block away."""
-        self._orb.deactivate(self._end)
-        self._end.end()
+        end, self._end = self._end, None
+        if end is not None:
+            self._orb.deactivate(end)
+            end.end()
 
     def _failed(self, error: CORBA.Exception) -> PortStatus:
         if isinstance(error, LOST):

@@ -126,7 +126,9 @@ class CorbaOffer:
 
     def close(self) -> None:
         """Take the object away."""
-        self._orb.deactivate(self._servant)
+        servant, self._servant = self._servant, None
+        if servant is not None:
+            self._orb.deactivate(servant)
 
 
 class _Caller:
