@@ -580,10 +580,7 @@ def hand_over(handle: Any) -> Callable[[Callable[[], object]], object] | None:
 
 
 def share(context: Context) -> Sharing:
-    """Has a context shared by threads from now on; what stands between it and its middleware.
-
-    Raises RclError where an asyncio loop serves the space of the context: threads may not use that.
-    """
+    """Has a context shared by threads from now on. RclError where the loop of an asyncio program serves its space."""
     if isinstance(context.middleware, Sharing):
         return context.middleware
     if not getattr(context.middleware, "served", True):
