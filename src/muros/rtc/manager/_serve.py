@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Final
 
 from muros import __version__
@@ -17,6 +15,7 @@ from muros.rtc.component import Component
 from muros.rtc.manager._manager import Manager
 from muros.rtc.manager._requests import ComponentId, CreateRequest
 from muros.rtc.manager._settings import Options, parse_options, read_settings
+from muros.rtc.manager._signals import ended_by_signals
 from muros.rtc.properties import ConfError, Properties
 
 __all__ = ["serve", "serve_files", "serve_manager"]
@@ -110,27 +109,19 @@ def _serve(options: Options, init: Callable[[Manager], object] | None) -> int:
         return _fail(error, WRONG_USE)
     manager.reporter.on_finding(_show)
 
-    def end(number: int, frame: FrameType | None) -> None:
-        for one in before:
-            signal.signal(one, signal.SIG_DFL)
-        manager.shutdown()
-
-    before = {number: signal.signal(number, end) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        try:
-            manager.start(init)
-            if not manager.is_ending:
-                _greet(manager)
-            manager.wait()
-        finally:
-            manager.close()
+        with ended_by_signals(manager.shutdown):
+            try:
+                manager.start(init)
+                if not manager.is_ending:
+                    _greet(manager)
+                manager.wait()
+            finally:
+                manager.close()
     except ConfError as error:
         return _fail(error, WRONG_USE)
     except RtcError as error:
         return _fail(error, FAILED)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
     return 0
 
 
