@@ -45,6 +45,7 @@ from OpenRTM_aist._data_ports import (
     OutPort,
     OutPortBase,
     RingBuffer,
+    instantiateDataType,
 )
 from OpenRTM_aist._manager import Manager
 from OpenRTM_aist._ports import PortBase, PortConnectListenerType, PortConnectRetListenerType
@@ -137,6 +138,7 @@ __all__ = [
     "escape",
     "flatten",
     "includes",
+    "instantiateDataType",
     "isAbsolutePath",
     "isURL",
     "normalize",

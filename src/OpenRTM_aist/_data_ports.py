@@ -31,6 +31,7 @@ __all__ = [
     "OutPort",
     "OutPortBase",
     "RingBuffer",
+    "instantiateDataType",
 ]
 
 
@@ -181,6 +182,11 @@ class OnWriteConvert:
 
     def __call__(self, value: Any) -> Any:
         return value
+
+
+def instantiateDataType(dtype: type) -> Any:
+    """A value of zeros of a data type, `RTC.TimedLong`: what the code that RTCBuilder writes makes ports of."""
+    return data_type_of(dtype).default()
 
 
 class _DataPort(PortBase):

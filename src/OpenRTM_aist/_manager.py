@@ -5,19 +5,18 @@ from __future__ import annotations
 
 import atexit
 import os
-import signal
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import nullcontext
 from inspect import isfunction
-from types import FrameType
 from typing import Any, ClassVar
 
 from muros.findings import Finding
 from muros.rtc.codes import RtcError
 from muros.rtc.component import Component
 from muros.rtc.manager import Manager as Core
-from muros.rtc.manager import parse_options, read_settings
+from muros.rtc.manager import ended_by_signals, parse_options, read_settings
 from muros.rtc.properties import ConfError
 from OpenRTM_aist._components import Logger, RTObject_impl, _Behind
 from OpenRTM_aist._properties import Properties
@@ -95,21 +94,9 @@ class Manager:
             threading.Thread(target=self._serve, name="OpenRTM_aist.Manager", daemon=True).start()
             atexit.register(self._close)
             return
-        before: dict[signal.Signals, Any] = {}
-        if threading.current_thread() is threading.main_thread():
-
-            def end(number: int, frame: FrameType | None) -> None:
-                for one in before:
-                    signal.signal(one, signal.SIG_DFL)
-                self.core.shutdown()
-
-            for number in (signal.SIGINT, signal.SIGTERM):
-                before[number] = signal.signal(number, end)
-        try:
+        in_main_thread = threading.current_thread() is threading.main_thread()
+        with ended_by_signals(self.core.shutdown) if in_main_thread else nullcontext():
             self._serve()
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
 
     def shutdown(self) -> None:
         """Say that the end has come."""

@@ -165,6 +165,16 @@ def test_values_go_through_ports(manager: rtm.Manager) -> None:
     assert rtm.DataPortStatus.toString(ports.out.getStatus(0)) == "PORT_OK"
 
 
+@pytest.mark.parametrize("kind", [RTC.TimedLong, RTC.TimedDoubleSeq, RTC.CameraImage, RTC.TimedWString])
+def test_values_of_zeros_for_ports(manager: rtm.Manager, kind: Any) -> None:
+    """The code that RTCBuilder writes makes each port's variable so."""
+    value = rtm.instantiateDataType(kind)
+    assert isinstance(value, kind)
+    assert (value.tm.sec, value.tm.nsec) == (0, 0)
+    assert rtm.instantiateDataType(kind) is not value
+    assert rtm.OutPort("out", value).getPortDataType() == kind._NP_RepositoryId
+
+
 def test_a_buffer_of_the_ports_own(manager: rtm.Manager) -> None:
     class Old(Ports):
         def onInitialize(self) -> Any:  # noqa: N802

@@ -16,6 +16,7 @@ from muros.rtc.manager._modules import LoadedModule, ModuleError
 from muros.rtc.manager._requests import RequestError
 from muros.rtc.manager._serve import serve, serve_files, serve_manager
 from muros.rtc.manager._settings import OPTIONS_HELP, Options, Settings, parse_options, read_settings
+from muros.rtc.manager._signals import ended_by_signals
 
 __all__ = [
     "OPTIONS_HELP",
@@ -29,6 +30,7 @@ __all__ = [
     "Options",
     "RequestError",
     "Settings",
+    "ended_by_signals",
     "parse_options",
     "read_settings",
     "serve",
