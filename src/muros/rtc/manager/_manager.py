@@ -15,6 +15,7 @@ import threading
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Final
 
 from muros.findings import Severity
@@ -92,7 +93,10 @@ class Manager:
         self._loading: Path | None = None
         self._lock = threading.RLock()
         self._load_lock = threading.RLock()  # as Python's own lock for imports, held while modules run
-        self._ending = threading.Event()
+        # Signals interrupt the main thread wherever it is: what says that the end has come must need no lock that it
+        # may hold. A simple queue needs none; whoever takes the one thing in it puts it back for the others.
+        self._is_ending = False
+        self._end = SimpleQueue[None]()
         self._closed = False
         self.register(
             PeriodicECSharedComposite.spec(),
@@ -187,18 +191,24 @@ class Manager:
 
     def wait(self, timeout: float | None = None) -> bool:
         """Wait until it is to end. False: `timeout` seconds passed before."""
-        return self._ending.wait(timeout)
+        try:
+            self._end.get(timeout=timeout)
+        except Empty:
+            return False
+        self._end.put(None)
+        return True
 
     def shutdown(self) -> None:
-        """Say that the end has come; whoever `wait`s then calls `close`. Any thread, any number of times."""
-        if not self._ending.is_set():
-            self._ending.set()
+        """Say that the end has come; whoever `wait`s then calls `close`. Any thread or signal, any number of times."""
+        if not self._is_ending:
+            self._is_ending = True
+            self._end.put(None)
             self.listeners.tell(ManagerEvent.SHUTDOWN)
 
     @property
     def is_ending(self) -> bool:
         """Whether the end has come."""
-        return self._ending.is_set()
+        return self._is_ending
 
     def close(self) -> None:
         """End all components, take names back, end the ORB and the log. Twice is once; not in a call from outside."""
