@@ -98,6 +98,10 @@ def test_what_is_read_of_a_class_is_what_it_says_itself(folder: Path) -> None:
     assert said == loaded.components[0].spec()
 
 
+def test_tools_that_name_the_usual_function_load_the_new_style(folder: Path) -> None:
+    assert modules(folder).load("NewStyle", "NewStyleInit").components
+
+
 def test_classes_in_between_are_no_components(tmp_path: Path) -> None:
     path = tmp_path / "NewStyleParts.py"
     path.write_text(

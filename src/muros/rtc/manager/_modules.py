@@ -189,10 +189,11 @@ def _is_of(module: ModuleType, path: Path) -> bool:
 def _entry(
     path: Path, module: ModuleType, init: str
 ) -> tuple[Callable[[Any], object] | None, tuple[type[Component], ...]]:
-    function = getattr(module, init or f"{path.stem}Init", None)
+    usual = f"{path.stem}Init"
+    function = getattr(module, init or usual, None)
     if callable(function):
         return function, ()
-    if init:
+    if init not in ("", usual):  # the usual one is named by tools that know no files without it
         raise ModuleError(f"{path}: it has no function {init}")
     own = [
         value
