@@ -16,7 +16,7 @@ import pytest
 from muros.rtc.codes import PeerLostError, ReturnCode, RtcError
 from muros.rtc.corba import Orb, RunningNameServer
 from muros.rtc.corba._manager import PeerManager
-from muros.rtc.corba._naming import NameServer
+from muros.rtc.corba._naming import NameServer, is_same
 from muros.rtc.corba._world import CorbaWorld
 from muros.rtc.manager._defaults import DEFAULTS
 from muros.rtc.properties import Properties
@@ -184,6 +184,24 @@ def test_a_name_asked_for_twice_is_bound_when_the_first_has_gone(
     first.send_signal(signal.SIGINT)
     assert first.wait(20) == 0
     wait_until(lambda: _lives(server.resolve("Only.rtc")))
+
+
+def test_a_component_that_stands_still_keeps_its_name(
+    managers: Managers, orb: Orb, name_server: RunningNameServer
+) -> None:
+    """As one in a debugger does."""
+    words = ("-o", "manager.components.precreate:Wheel", "-o", "naming.formats:%n.rtc")
+    first = managers.start(*words)
+    server = NameServer(orb, name_server.address)
+    wait_until(lambda: server.resolve("Wheel0.rtc") is not None)
+    reference = server.resolve("Wheel0.rtc")
+    first.send_signal(signal.SIGSTOP)
+    try:
+        second = managers.start(*words)
+        assert "component Wheel1 is there" in managers.said(second)
+        assert is_same(server.resolve("Wheel0.rtc"), reference)
+    finally:
+        first.send_signal(signal.SIGCONT)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -16,6 +16,7 @@ from functools import partial
 from typing import Any, Final
 
 import omniORB
+from omniORB import CORBA
 
 from muros.rtc.codes import PeerLostError, RtcError
 from muros.rtc.corba._naming import Names, NameServer, _quoted, is_same, lives, split_path
@@ -103,7 +104,7 @@ class Registration:
         for server in self._answering():
             with self._noted(server):
                 bound = server.resolve(name)
-                if bound is not None and not is_same(bound, self._names.bound.get(name)) and lives(bound):
+                if not is_same(bound, self._names.bound.get(name)) and not _has_gone(bound):
                     return False
         return True
 
@@ -161,6 +162,16 @@ class Registration:
         self._reporter.report(
             "name-not-bound", who="naming", what=f"{name} is not bound", why=why, remedy=remedy, subject=name
         )
+
+
+def _has_gone(reference: Any | None) -> bool:
+    """Whether there is nobody behind a reference. One that is slow to answer lives."""
+    try:
+        return reference is None or bool(reference._non_existent())
+    except CORBA.TIMEOUT:
+        return False
+    except CORBA.Exception:
+        return True
 
 
 @contextlib.contextmanager
