@@ -10,6 +10,7 @@ Calls to other processes end after `call_timeout` and connecting after `connect_
 
 from __future__ import annotations
 
+import atexit
 import os
 import threading
 from collections.abc import Iterable, Sequence
@@ -19,6 +20,7 @@ from omniORB import CORBA
 
 from muros.rtc.codes import RtcError
 from muros.rtc.corba._adapter import Adapter, Place, object_key
+from muros.rtc.corba._workers import wait_until_gone
 
 __all__ = ["Orb", "current_orb", "endpoint_arguments", "start_orb"]
 
@@ -30,6 +32,9 @@ CONNECT_TIMEOUT: Final = 3.0
 
 MAX_MESSAGE: Final = 64 << 20
 """Octets of the largest message sent or taken. omniORB's own limit is 2 MiB, less than a camera's image."""
+
+THREADS_SECONDS: Final = 5.0
+"""Time that the ORB's threads have to end after it."""
 
 _lock = threading.Lock()
 _current: Orb | None = None
@@ -200,9 +205,17 @@ class Orb:
                 return
             self._destroyed = True
         self._adapter.close()
+        wait_until_gone(THREADS_SECONDS)
         with _lock:
             if _current is self:
                 _current = None
+
+
+@atexit.register
+def _end_at_exit() -> None:
+    """A process must not end before the ORB's threads have (`_workers.py`)."""
+    if _current is not None:
+        _current.shutdown()
 
 
 def _address(text: str) -> str:
