@@ -1,12 +1,18 @@
-"""SIGINT and SIGTERM as a wish to end: once is enough, and a second one does not wait."""
+"""SIGINT and SIGTERM as a wish to end: once is enough, and a second one does not wait.
+
+The ORB's threads may be the ones that the system hands a signal to; Python then runs no handler before the main thread
+comes back from whatever it waits in, which may be never. So a thread listens to the pipe that signals are written to
+in whichever thread they come, and says what they mean. It may wait for locks, which a handler must not.
+"""
 
 from __future__ import annotations
 
+import os
 import signal
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import FrameType
 from typing import Final
 
 __all__ = ["ended_by_signals"]
@@ -18,25 +24,37 @@ SAME_WISH: Final = 0.1
 
 @contextmanager
 def ended_by_signals(end: Callable[[], object]) -> Iterator[None]:
-    """While it is entered, SIGINT and SIGTERM call `end`; one that comes later ends the process at once.
+    """While it is entered, SIGINT and SIGTERM call `end`, in a thread; one that comes later ends the process at once.
 
     To be entered in the main thread.
     """
-
-    def handle(number: int, frame: FrameType | None) -> None:
-        _set_all(signal.SIG_IGN)
-        end()
-        time.sleep(SAME_WISH)
-        _set_all(signal.SIG_DFL)  # not a handler: the main thread may be in a call that lets none run
-
-    before = {number: signal.signal(number, handle) for number in SIGNALS}
+    source, sink = os.pipe()
+    os.set_blocking(sink, False)
+    listener = threading.Thread(target=_listen, args=(source, end), name="rtc-signals", daemon=True)
+    handlers = {number: signal.signal(number, lambda number, frame: None) for number in SIGNALS}
+    before = signal.set_wakeup_fd(sink, warn_on_full_buffer=False)
+    listener.start()
     try:
         yield
     finally:
-        for number, handler in before.items():
+        signal.set_wakeup_fd(before)
+        for number, handler in handlers.items():
             signal.signal(number, handler)
+        os.close(sink)
+        listener.join()
+        os.close(source)
 
 
-def _set_all(handler: signal.Handlers) -> None:
-    for number in SIGNALS:
-        signal.signal(number, handler)
+def _listen(source: int, end: Callable[[], object]) -> None:
+    """Call `end` for the first signal that comes out of a pipe; end the process for one after that."""
+    ended: float | None = None
+    while numbers := os.read(source, 64):
+        now = time.monotonic()
+        for number in numbers:
+            if number not in SIGNALS:
+                continue
+            if ended is None:
+                end()
+                ended = now = time.monotonic()
+            elif now - ended > SAME_WISH:
+                os._exit(128 + number)
