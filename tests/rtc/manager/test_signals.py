@@ -13,11 +13,11 @@ from muros.rtc.manager import ended_by_signals
 from tests.rtc.manager._processes import wait_until
 
 WAITING = """
-import sys, threading
+import threading
 from muros.rtc.manager import ended_by_signals
 with ended_by_signals(lambda: print("wish", flush=True)):
     print("ready", flush=True)
-    threading.Lock().acquire() and threading.Event().wait()
+    threading.Event().wait()
 """
 
 
