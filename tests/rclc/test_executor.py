@@ -795,6 +795,44 @@ def test_x6_removing_what_is_not_there(bench: Bench) -> None:
     assert getattr(none.value, "code", None) == 11
 
 
+@pytest.mark.parametrize("semantics", [RCLCPP, LET])
+@pytest.mark.parametrize("gone", [0, 1, 2])
+@pytest.mark.parametrize("how", ["destroy", "remove"])
+def test_who_takes_a_handle_away_shifts_no_others(bench: Bench, semantics: int, gone: int, how: str) -> None:
+    calls: list[int] = []
+
+    def call(i: int) -> None:
+        calls.append(i)
+        if i == 1:
+            guards[gone].destroy() if how == "destroy" else executor.remove(guards[gone])
+
+    guards = [GuardCondition(bench.context, lambda i=i: call(i)) for i in range(4)]  # type: ignore[misc]
+    executor = bench.executor(semantics=semantics)
+    for guard in guards:
+        executor.add(guard)
+        guard.trigger()
+    assert executor.spin_some()
+    assert calls == [i for i in range(4) if i != gone or i <= 1]
+    assert not executor.spin_some()
+
+
+def test_who_ends_a_client_when_nobody_has_answered_hears_no_more_of_it(bench: Bench) -> None:
+    client = bench.context.node("n").client(AddTwoInts, "add")
+    bench.settle()
+    answers: list[None] = []
+
+    def ended(reply: Any) -> None:
+        answers.append(reply)
+        client.destroy()
+
+    executor = bench.executor()
+    for _ in range(3):
+        assert client.send(AddTwoInts.Request(), ended, timeout=0.05)
+    assert executor.spin_until(lambda: answers, 1.0)
+    assert not executor.spin_some(0.1)
+    assert answers == [None]
+
+
 MISUSED: list[tuple[Callable[[Context], object], type[Exception], str]] = [
     (lambda c: c.node("n").timer(1.0, print).exchange_period(-1), ValueError, "period of a timer is -1: it"),
     (lambda c: c.node("n").timer(1.0, print).exchange_period(math.nan), ValueError, "timer is nan: it"),

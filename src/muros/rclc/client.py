@@ -62,16 +62,17 @@ class Client(Handle):
         return len(self._waiting) > 0 or self.left(now) == 0
 
     def run(self, now: int) -> None:
-        """Hands on a reply; ends the wait for requests that are too old."""
+        """Hands on a reply, or ends the wait for a request that is too old."""
         if self._waiting:
             on_reply, response = self._waiting.pop(0)
             on_reply(response)
             return
-        for number in list(self._asked):
+        for number in self._asked:
             on_reply, end = self._asked[number]
             if ticks_diff(end, now) <= 0:
                 del self._asked[number]
                 on_reply(None)
+                return
 
     def left(self, now: int) -> int:
         """Milliseconds until the first request is too old."""

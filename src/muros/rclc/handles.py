@@ -66,7 +66,7 @@ def remove(self: "Executor", handle: "Any") -> None:
 
 
 def stop(self: "Executor") -> None:
-    """Ends ``spin`` and ``spin_period`` when the callback that runs, or the period, is over."""
+    """Ends ``spin`` and ``spin_period`` when the pass that runs, or with LET the period, is over."""
     self.stopped = True
 
 

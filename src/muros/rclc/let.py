@@ -185,6 +185,8 @@ class Let:
     def run(self, task: Task) -> None:
         """Has a handle work on what was taken."""
         handle = task.handle
+        if handle not in self.executor.handles:
+            return  # a callback of this period has taken it away
         if not hasattr(handle, "take"):
             handle.run(self._start)
         elif handle.callback is not None:

@@ -257,7 +257,7 @@ class Executor(executor_.Executor):
         await self._drive_async(self._periods(self._period(period)))
 
     def stop(self) -> None:
-        """Ends what spins when the callback that runs, or with LET the period, is over; from any thread.
+        """Ends what spins when the pass that runs, or with LET the period, is over; from any thread.
 
         Called while nothing spins it ends the next one as soon as it would wait. The context stays open.
         """
@@ -289,9 +289,9 @@ class Executor(executor_.Executor):
         elif trigger is not None and not self._triggered(trigger):
             return False
         ran = False
-        always = self.always
-        for handle in self.handles:
-            if handle.ready(now) or handle in always:
+        always, handles = self.always, self.handles
+        for handle in handles[:]:  # a callback may take handles away
+            if (handle.ready(now) or handle in always) and handle in handles:
                 ran = True
                 try:
                     handle.run(now)
