@@ -2,7 +2,7 @@
 
 from muros.client import Session
 from muros.client.raw import Raw
-from muros.compat import const
+from muros.compat import const, ticks_add
 from muros.rclc.context import Context
 from muros.rclc.errors import CapacityError
 from muros.rclc.executor import Executor
@@ -135,6 +135,29 @@ def test_x13_timers() -> None:
     for _ in range(10):
         executor.spin_some(0.05)
     assert calls == [100, 200, 300, 400, 500]
+
+
+def test_a_timer_keeps_its_phase_and_skips_what_it_has_missed() -> None:
+    bench = Bench()
+    timer = bench.node.timer(0.1, lambda: None)
+    start = bench.way.now
+    left: "list[int]" = []
+    for late in (100, 299, 300, 401, 599, 1099):
+        assert timer.ready(start + late)
+        timer.run(start + late)
+        left.append(timer.left(start + late))
+    assert left == [100, 1, 100, 99, 1, 1]
+    assert timer.since == 500
+
+
+def test_a_timer_without_a_period_is_ready_after_weeks_too() -> None:
+    bench = Bench()
+    timer = bench.node.timer(0, lambda: None)
+    now = bench.way.now
+    for _ in range(6):
+        assert timer.ready(now), "ticks of boards begin again after twelve days"
+        timer.run(now)
+        now = ticks_add(now, 1 << 28)
 
 
 def test_x14_x15_a_timer_cancels_itself_and_stops_no_messages() -> None:

@@ -52,9 +52,7 @@ class Timer(Handle):
         self.since = ticks_diff(now, self._last)
         self._last = now
         late = ticks_diff(now, self._next)
-        self._next = ticks_add(
-            self._next, period if late < period or period == 0 else late // period * period + period
-        )
+        self._next = ticks_add(self._next, late - late % (period or 1) + period)
         self.callback()
 
     def left(self, now: int) -> int:
