@@ -114,6 +114,15 @@ CASES: list[tuple[Callable[[Any], object], type[Exception], int, str]] = [
         "the callback of a handle",
     ),
     (lambda n: Executor(n.context).spin_period(0), ValueError, 11, "period is 0"),
+    (
+        lambda n: n.parameters().on_change(FIVE),
+        TypeError,
+        11,
+        "the callback of a change is a function, not 5",
+    ),
+    (lambda n: n.parameters().get(FIVE), TypeError, 11, "the name of a parameter is a str, not 5"),
+    (lambda n: n.parameters().set(FIVE, 1), TypeError, 11, "the name of a parameter is a str, not 5"),
+    (lambda n: n.parameters().update(FIVE), TypeError, 11, "set by a dict of names and values, not 5"),
 ]
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from muros.rclc import parameter_making, parameter_rules, parameters
+from muros.rclc.host.checks import WrongTypeError, be_callable, be_text
 from muros.rclc.host.parameter_files import fitting, kind
 from muros.rclc.parameter_errors import ParameterTypeError
 from muros.rclc.parameter_values import TYPES, kind_of
@@ -13,6 +14,7 @@ from muros.rclc.parameter_values import TYPES, kind_of
 if TYPE_CHECKING:
     from muros.rclc.host.context import Node
     from muros.rclc.memory import Rules
+    from muros.rclc.parameters import Parameter
 
 __all__ = ["Parameters"]
 
@@ -72,8 +74,23 @@ class Parameters(parameters.Parameters):
             self.declare(name, self.given[name])
         return names
 
+    def get(self, name: str) -> Any:
+        """The value of a parameter. ParameterNotDeclaredError for an unknown one."""
+        be_text(name, "the name of a parameter")
+        return super().get(name)
+
+    def on_change(self, callback: Callable[[Parameter | None, Parameter | None], object] | None) -> None:
+        """Has ``callback(old, new)`` decide on each change; see ``muros.rclc.parameters.Parameters.on_change``."""
+        if callback is not None:
+            be_callable(callback, "the callback of a change")
+        super().on_change(callback)
+
     def update(self, values: dict[str, Any]) -> None:
         """Sets several parameters of ours at once: all or none. A ParameterError says what stands against it."""
+        if not isinstance(values, Mapping):
+            raise WrongTypeError(f"parameters are set by a dict of names and values, not {values!r}")
+        for name in values:
+            be_text(name, "the name of a parameter")
         parameter_rules.update(self, values)
         self._applied()
 
