@@ -12,6 +12,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Final
 
+from muros.cli._rtc_idl import members_of, with_included
 from muros.rtc.codes import RtcError
 from muros.rtc.profile_xml import (
     DataPortProfile,
@@ -51,7 +52,7 @@ def wishes_of(arguments: argparse.Namespace) -> Wishes:
             interface.idl_file for port in profile.service_ports for interface in port.interfaces
         )
         files = [folder / name for name in named if name and (folder / name).is_file()]
-        return Wishes(_checked(replace(profile, language="Python")), tuple(files))
+        return Wishes(_checked(replace(profile, language="Python")), with_included(files))
     if not arguments.name:
         raise RtcError("name the component, or give --profile RTC.xml")
     today = datetime.now().astimezone().isoformat(timespec="seconds")
@@ -80,7 +81,7 @@ def wishes_of(arguments: argparse.Namespace) -> Wishes:
         ),
         service_ports=services,
     )
-    return Wishes(_checked(profile), tuple(dict.fromkeys([*files, *data_idl])))
+    return Wishes(_checked(profile), with_included([*files, *data_idl]))
 
 
 def write_component(wishes: Wishes, folder: Path, *, force: bool = False) -> list[Path]:
@@ -140,9 +141,7 @@ def component_source(wishes: Wishes) -> str:
     ]
     if declared:
         lines += ["", *declared]
-    for _, one in interfaces:
-        if one.provided:
-            lines += _operations(one, wishes.idl)
+    lines += _members((one for _, one in interfaces if one.provided), wishes.idl)
     lines += [
         "",
         "    def on_activated(self, context: int) -> None:",
@@ -329,6 +328,8 @@ def _declared_interface(port: ServicePortProfile, one: ServiceInterfaceProfile, 
         f"port={_quoted(port.name)}",
         f"instance={_quoted(one.instance_name)}",
     ]
+    if "::" in one.type:  # the code that editors write in other languages says the whole name, too
+        words.append(f"type_name={_quoted(one.type)}")
     return f"    {attribute} = {'Provided' if one.provided else 'Required'}({', '.join(words)})"
 
 
@@ -360,36 +361,23 @@ def _scalar(kind: str, text: str) -> object:
     return text
 
 
-def _operations(one: ServiceInterfaceProfile, files: Sequence[Path]) -> list[str]:
-    """A method for each operation of an interface, as its IDL text has them."""
-    text = next((_read(path) for path in files if path.name == one.idl_file), "")
-    text = re.sub(r"//[^\n]*|/\*.*?\*/", "", text, flags=re.DOTALL)
-    name = one.type.rpartition("::")[2]
-    found = re.search(rf"\binterface\s+{name}\b[^{{;]*{{(.*?)}}\s*;", text, re.DOTALL)
+def _members(interfaces: Iterable[ServiceInterfaceProfile], files: Sequence[Path]) -> list[str]:
+    """What the component needs to provide interfaces: a method for each operation, a value for each attribute."""
+    found = {member.name: member for one in interfaces for member in members_of(one.type, files)}
     lines: list[str] = []
-    for operation in re.finditer(
-        r"(?:^|[;{])\s*(?:oneway\s+)?[\w:<>,\s]+?\s(\w+)\s*\(([^)]*)\)", found[1] if found else ""
-    ):
-        parameters = re.findall(r"\b(?:in|inout)\s+[\w:<>\s]+?\s(\w+)\s*(?:,|$)", operation[2])
-        words = [f"{word}_" if keyword.iskeyword(word) else word for word in ("self", *parameters)]
+    for member in found.values():
+        told = f"{member.interface}.{member.name}"
+        if member.parameters is None:
+            lines += ["", f"    {member.name} = None", f'    """{told}: callers read it."""']
+            continue
+        words = [f"{word}_" if keyword.iskeyword(word) else word for word in ("self", *member.parameters)]
         lines += [
             "",
-            f"    def {operation[1]}({', '.join(words)}):",
-            f'        """{name}.{operation[1]}"""',
+            f"    def {member.name}({', '.join(words)}):",
+            f'        """{told}"""',
             "        raise NotImplementedError",
         ]
     return lines
-
-
-_OPERATION: Final = re.compile(r"(?:^|;)\s*(?:oneway\s+)?[\w:<>,\s]+?\s(\w+)\s*\(([^)]*)\)")
-_GIVEN: Final = re.compile(r"\b(?:in|inout)\s+[\w:<>\s]+?\s(\w+)\s*(?:,|$)")
-
-
-def _read(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""
 
 
 def _quoted(value: object) -> str:

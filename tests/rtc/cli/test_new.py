@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 from muros.cli import main
-from muros.rtc.profile_xml import read_profile_file
+from muros.rtc.profile_xml import DataPortProfile, read_profile_file, read_profile_untrusted
+from tests.rtc.manager._processes import ENVIRONMENT
+
+SHIM = Path(__file__).parents[1] / "shim" / "components"
 
 IDL = """
 // a service
@@ -42,6 +45,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def muros(*words: str) -> subprocess.CompletedProcess[str]:
+    """The command as a process of its own: an ORB is one for each process."""
+    command = [sys.executable, "-m", "muros", *words]
+    return subprocess.run(command, capture_output=True, text=True, timeout=50, env=ENVIRONMENT)
+
+
 def test_everything_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["rtc", "new", "Turner", *ALL]) == 0
     out, err = capsys.readouterr()
@@ -65,8 +74,10 @@ def test_everything_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) ->
         "    on = Parameter(True)",
         "    count = Parameter(3)",
         '    text = Parameter("say \\"hi\\"")',
-        '    my = Provided("SimpleService::MyService", idl="MyService.idl", port="MyService", instance="my")',
-        '    their = Required("SimpleService::MyService", idl="MyService.idl", port="Other", instance="their")',
+        '    my = Provided("SimpleService::MyService", idl="MyService.idl", port="MyService", instance="my", '
+        'type_name="SimpleService::MyService")',
+        '    their = Required("SimpleService::MyService", idl="MyService.idl", port="Other", instance="their", '
+        'type_name="SimpleService::MyService")',
         "    def echo(self, msg):",
         "    def get_echo_history(self):",
         "    def set_value(self, value, from_):",
@@ -84,6 +95,45 @@ def test_the_profile_gives_the_same_component(folder: Path) -> None:
     assert (folder / "again/Turner.py").read_text() == (folder / "Turner/Turner.py").read_text()
     assert read_profile_file(folder / "again/RTC.xml") == read_profile_file(folder / "Turner/RTC.xml")
     assert (folder / "again/MyService.idl").read_text() == IDL
+
+
+def test_the_component_gives_the_profile(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """From the words to a profile and a component, and from the component to a profile that says the same."""
+    assert main(["rtc", "new", "Turner", *ALL]) == 0
+    capsys.readouterr()
+    done = muros("rtc", "profile", "Turner/Turner.py")
+    assert (done.returncode, done.stderr) == (0, "")
+    again = read_profile_untrusted(done.stdout.encode(), "printed")
+    written = read_profile_file(folder / "Turner/RTC.xml")
+    assert [port.name for port in again.data_ports] == ["in", "out", "port"]
+    assert again.data_ports == written.data_ports
+    assert [one.name for one in again.parameters] == [one.name for one in written.parameters]
+    assert again.parameters[0] == written.parameters[0]
+    assert again.id == written.id
+    assert (again.execution_rate, again.max_instances) == (50.0, 4)
+    assert again.actions["OnExecute"]
+    assert not again.actions["OnError"]
+    for ours, theirs in zip(again.service_ports, written.service_ports, strict=True):
+        (one,), (other,) = ours.interfaces, theirs.interfaces
+        assert (ours.name, one.instance_name, one.provided) == (
+            theirs.name,
+            other.instance_name,
+            other.provided,
+        )
+
+
+def test_profiles_of_other_components(folder: Path) -> None:
+    done = muros("rtc", "profile", str(SHIM / "ConsoleOut.py"))
+    profile = read_profile_untrusted(done.stdout.encode(), "printed")
+    assert profile.data_ports == (DataPortProfile("in", "DataInPort", "RTC::TimedLong"),)
+    assert profile.actions["OnExecute"]
+    assert not profile.actions["OnReset"]
+    (folder / "two.py").write_text(
+        "from muros.rtc import Component\nclass A(Component): ...\nclass B(Component): ..."
+    )
+    assert muros("rtc", "profile", "two.py").stderr == "muros: two.py has A, B; choose one with --kind\n"
+    assert ":B:" in muros("rtc", "profile", "two.py", "--kind", "B").stdout
+    assert muros("rtc", "profile", "none.py").stderr == f"muros: {folder}/none.py: no such file\n"
 
 
 def test_nothing_is_written_over(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -135,3 +185,42 @@ def test_the_written_test_passes(folder: Path) -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert "4 passed" in done.stdout
+
+
+DERIVED = """
+#include "MyService.idl"
+#include <BasicDataType.idl>
+module Better {
+  exception Failed { string why; };
+  interface Plain;
+  interface Named { readonly attribute string label, place; };
+  interface BetterService : SimpleService::MyService, Named {
+    void reset(in long from_, out long to) raises (Failed);
+  };
+};
+"""
+
+
+def test_operations_are_inherited_and_included_files_come_along(folder: Path) -> None:
+    """The component runs: nothing that its interface has is missing."""
+    (folder / "Better.idl").write_text(DERIVED)
+    wishes = ["--service", "Best:best:Better::BetterService", "--service-idl", "Better.idl"]
+    assert main(["rtc", "new", "Server", *wishes]) == 0
+    lines = (folder / "Server/Server.py").read_text().splitlines()
+    methods = [line.strip() for line in lines if line.startswith("    def ") and "context" not in line]
+    assert methods == [
+        "def reset(self, from_):",
+        "def echo(self, msg):",
+        "def get_echo_history(self):",
+        "def set_value(self, value, from_):",
+        "def get_value(self, all_):",
+    ]
+    assert [line for line in lines if line.endswith(" = None")] == ["    label = None", "    place = None"]
+    assert (folder / "Server/MyService.idl").read_text() == IDL
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "Server"],
+        capture_output=True,
+        text=True,
+        timeout=50,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
