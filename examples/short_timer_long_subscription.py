@@ -6,7 +6,8 @@ prints
 
     timer, 100 ms since the last
     subscription works for 250 ms
-    timer, 300 ms since the last
+    timer, 250 ms since the last
+    timer, 50 ms since the last
     timer, 100 ms since the last
 """
 
