@@ -26,6 +26,7 @@ RT components, compatible with OpenRTM-aist.
 commands:
   run FILE...   make a component of each kind in the files and run them
   new NAME      write a new component, its RTC.xml and a test
+  profile FILE  print the RTC.xml of a component
   names         start a name service on this machine
 
 muros rtc COMMAND --help says more.
@@ -43,7 +44,7 @@ options:
 def run(argv: Sequence[str]) -> int:
     """The command with the words behind its name; returns the exit status."""
     word, rest = (argv[0], argv[1:]) if argv else ("", [])
-    commands = {"run": _run, "new": _new, "names": _names}
+    commands = {"run": _run, "new": _new, "profile": _profile, "names": _names}
     if word in ("-h", "--help"):
         print(HELP, end="")
         return 0
@@ -131,6 +132,34 @@ def _new(argv: Sequence[str]) -> int:
     for file in files:
         print(file)
     print(f"run it with: muros rtc run {files[0]}", file=sys.stderr)
+    return 0
+
+
+def _profile(argv: Sequence[str]) -> int:
+    parser = argparse.ArgumentParser(
+        "muros rtc profile",
+        description="Print the RTC.xml of a component, in the style of muros or of OpenRTM-aist. It is made for that, "
+        "where nobody sees it, and ended.",
+    )
+    parser.add_argument("file", metavar="FILE", help="the component's file")
+    parser.add_argument("--kind", metavar="NAME", help="which one, where there are several in the file")
+    arguments = parser.parse_args(argv)
+    from muros.rtc.codes import RtcError
+    from muros.rtc.manager.testing import running_manager
+    from muros.rtc.profile_xml import profile_of, write_profile
+
+    try:
+        with running_manager() as manager:
+            module = manager.load_file(Path(arguments.file))
+            kinds = [factory.name for factory in manager.factories_of(module)]
+            kind = arguments.kind or kinds[0]
+            if kind not in kinds or (len(kinds) > 1 and not arguments.kind):
+                raise RtcError(f"{arguments.file} has {', '.join(kinds)}; choose one with --kind")
+            text = write_profile(profile_of(manager.create_component(kind)))
+    except RtcError as error:
+        fail(error)
+        return FAILED
+    print(text, end="")
     return 0
 
 

@@ -141,7 +141,8 @@ def test_wrong_words(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["rtc"]) == 2
     assert main(["rtc", "walk"]) == 2
     assert capsys.readouterr().err == (
-        "muros: muros rtc run, new or names?\nmuros: unknown command 'walk': there are run, new and names\n"
+        "muros: muros rtc what? There are run, new, profile, names\n"
+        "muros: unknown command 'walk': there are run, new, profile, names\n"
     )
 
 

@@ -104,6 +104,8 @@ class Modules:
         was wrong with the file.
         """
         path = path.resolve()
+        if not path.is_file():
+            raise ModuleError(f"{path}: no such file")
         if path in self._loaded:
             return self._loaded[path]
         module = _import(path)
