@@ -49,11 +49,8 @@ def run(argv: Sequence[str]) -> int:
         print(HELP, end="")
         return 0
     if word not in commands:
-        fail(
-            f"unknown command {word!r}: there are run, new and names"
-            if word
-            else "muros rtc run, new or names?"
-        )
+        there = ", ".join(commands)
+        fail(f"unknown command {word!r}: there are {there}" if word else f"muros rtc what? There are {there}")
         return WRONG_USE
     if not has_extra():
         return MISSING
