@@ -58,10 +58,15 @@ def test_servants_are_dropped_when_their_calls_are_long_over(orb: Orb) -> None:
     gc.collect()
     assert watched() is not None
     now = RETIRED_SECONDS + 1.0
-    other = Target()
-    adapter.activate(other)
+    second = Target()
+    also_watched = weakref.ref(second)
+    reference = adapter.activate(second)
     assert watched() is None
-    adapter.deactivate(other)
+    adapter.deactivate(second)
+    del second
+    now *= 3
+    assert adapter.find(reference) is None
+    assert also_watched() is None
     adapter.close()
 
 

@@ -16,6 +16,7 @@ table of our own, and `_hash`, in whose place is `object_key`.
 from __future__ import annotations
 
 import logging
+import math
 import struct
 import threading
 import time
@@ -51,6 +52,7 @@ class Adapter:
         self._by_key: dict[bytes, tuple[Any, Any]] = {}
         """Servants by their keys, with the references that have these."""
         self._retired: deque[tuple[float, Any]] = deque()
+        self._drop_at = math.inf
 
     @property
     def servants(self) -> tuple[Any, ...]:
@@ -83,10 +85,13 @@ class Adapter:
                 del self._by_key[key]
                 self._end(self._keyed, key)
             self._end(self._poa, number)
-            self._retired.append((self._clock(), servant))
+            self._retire(servant)
 
     def find(self, reference: Any) -> Any | None:
         """The servant behind `reference`, by whichever of its references; None if it is another process's, or gone."""
+        if self._clock() > self._drop_at:
+            with self._gate:
+                self._drop_retired()
         try:
             return self._by_id.get(self._poa.reference_to_id(reference))
         except (CORBA.Exception, _POA.WrongAdapter):
@@ -129,11 +134,17 @@ class Adapter:
         except (CORBA.Exception, _POA.ObjectNotActive):
             _log.debug("object %r had gone already", number, exc_info=True)
 
+    def _retire(self, servant: Any) -> None:
+        """Keep what was taken away for some time; with the gate held."""
+        self._retired.append((self._clock() + RETIRED_SECONDS, servant))
+        self._drop_at = self._retired[0][0]
+
     def _drop_retired(self) -> None:
         """Drop what was taken away long ago; with the gate held."""
-        old = self._clock() - RETIRED_SECONDS
-        while self._retired and (self._retired[0][0] < old or len(self._retired) > RETIRED_LIMIT):
+        now = self._clock()
+        while self._retired and (self._retired[0][0] < now or len(self._retired) > RETIRED_LIMIT):
             self._retired.popleft()
+        self._drop_at = self._retired[0][0] if self._retired else math.inf
 
 
 class Place:
@@ -162,7 +173,7 @@ class Place:
             if self._active:
                 self._active = False
                 adapter._end(adapter._poa, self._number)
-                adapter._retired.append((adapter._clock(), self._servant))
+                adapter._retire(self._servant)
 
 
 def object_key(ior: str) -> bytes:
