@@ -210,6 +210,23 @@ def test_components_that_cannot_be_made_leave_nothing(make: Make, request_: str,
         manager.create_component(request_)
 
 
+def test_a_component_that_cannot_be_offered_is_ended(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(component: Component, key: str) -> object:
+        made.append(component)
+        raise RtcError("no room")
+
+    made: list[Component] = []
+    world = MemoryWorld()
+    manager = make(world)
+    manager.start()
+    with monkeypatch.context() as patched:
+        patched.setattr(world, "offer_component", refuse)
+        with pytest.raises(RtcError, match="no room"):
+            manager.create_component("Foo")
+    assert not made[0].is_initialized
+    assert manager.create_component("Foo").instance_name == "Foo0"
+
+
 def test_the_full_id_fits(make: Make) -> None:
     manager = make()
     manager.start()

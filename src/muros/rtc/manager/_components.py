@@ -77,13 +77,16 @@ class Components:
             return standing
         factory = self._factory(request.id)
         name = self._reserve(factory, request)
+        component = None
         try:
             component = self._make(factory, name, request)
+            self._welcome(component)
         except BaseException:
+            if component is not None:
+                component.exit()
             self._names.pop(name, None)
             self._manager.factories.release(name)
             raise
-        self._welcome(component)
         return component
 
     def forget(self, component: Component) -> None:
