@@ -122,6 +122,35 @@ def test_components_come_and_go_by_corbaloc(managers: Managers, world: CorbaWorl
         manager.name()
 
 
+def test_a_manager_that_is_not_offered_has_components_all_the_same(
+    managers: Managers, world: CorbaWorld
+) -> None:
+    managers.start("-a", "-p", str(port := find_free_port()), "-o", "manager.components.precreate:Wheel")
+    wait_until(lambda: world.instance_names() == {"Wheel0"})
+    with pytest.raises(PeerLostError, match="OBJECT_NOT_EXIST"):
+        world.manager_at(f"127.0.0.1:{port}")
+    named = world.orb.to_reference(f"corbaloc:iiop:127.0.0.1:{port}/test.Wheel0")
+    assert named._is_a("IDL:omg.org/RTC/RTObject:1.0")
+
+
+def test_slaves_by_their_names(managers: Managers, world: CorbaWorld) -> None:
+    managers.start("-d")
+    fast = ("-o", "corba.update_master_manager.interval:0.05")
+    for name in ("left", "right"):
+        managers.start(*fast, "-o", f"manager.instance_name:{name}")
+    master = world.manager_at(managers.master_address)
+    wait_until(lambda: len(master.listed("get_slave_managers")) == 2)
+    slaves = {one.name(): one for one in map(PeerManager, master.listed("get_slave_managers"))}
+    for name, wheel in (("right", "R"), ("left", "L")):
+        assert master.create_component(f"Wheel?instance_name={wheel}&manager_name={name}") is not None
+        assert slaves[name].instance_names() == {wheel}
+    assert slaves["left"].create_component("Wheel?instance_name=S&manager_name=right") is not None
+    assert slaves["right"].instance_names() == {"R", "S"}
+    assert master.instance_names() == {"L", "R", "S"}
+    assert master.create_component("Wheel?instance_name=S") is not None
+    assert master.instance_names() == {"L", "R", "S"}
+
+
 def test_a_master_makes_its_slaves_work(managers: Managers, world: CorbaWorld) -> None:
     """It starts one that it lacks; a slave's component can be deleted through it; all end with it."""
     process = managers.start("-d")
