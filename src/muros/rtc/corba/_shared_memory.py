@@ -138,6 +138,7 @@ class _End(OpenRTM__POA.PortSharedMemory):  # type: ignore[misc]
         self._get = get
         self._lock = threading.Lock()
         self._block: _Block | None = None
+        self._ended = False
         self.peer: Any = None
 
     # What the other side calls
@@ -180,6 +181,8 @@ class _End(OpenRTM__POA.PortSharedMemory):  # type: ignore[misc]
     def received(self) -> bytes | None:
         """The value in the sender's block; None, and a finding, if there is none."""
         with self._lock:
+            if self._ended:  # a value that was on its way when the connection ended
+                return None
             try:
                 if self._block is None:
                     raise ValueError("the sender has not told of its block")
@@ -218,14 +221,19 @@ class _End(OpenRTM__POA.PortSharedMemory):  # type: ignore[misc]
         return True
 
     def end(self) -> None:
-        """Let go of the block."""
+        """Let go of the block; one that comes now is not kept: calls may be on their way."""
+        with self._lock:
+            self._ended = True
         self._replace(None)
 
     def _replace(self, block: _Block | None) -> None:
         with self._lock:
-            before, self._block = self._block, block
-        if before is not None:
-            before.close()
+            if self._ended and block is not None:
+                unwanted: _Block | None = block
+            else:
+                unwanted, self._block = self._block, block
+        if unwanted is not None:
+            unwanted.close()
 
     def _tell(self, why: str) -> None:
         self._connection.report(
