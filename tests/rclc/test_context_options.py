@@ -89,6 +89,41 @@ def test_publish_waits_for_its_confirmation_when_asked() -> None:
     del bob
 
 
+def test_publish_waits_for_room_when_asked() -> None:
+    world = World()
+    alice, bob = two(world)
+    got: list[int] = []
+    bob.node.subscription(Int32, "value", lambda message: got.append(message.data))
+    publisher: Any = alice.node.publisher(Int32, "value")
+    bob.connect()
+    assert publisher.publish(Int32(data=1), timeout=2.0), "it waits for the connection"
+    world.network.partition(["alice"], ["agent"])
+    while publisher.publish(Int32(data=2)):
+        pass
+    dropped = sum(alice.session.drops)
+    assert not publisher.publish(Int32(data=3), timeout=0.1)
+    assert sum(alice.session.drops) == dropped + 1, "it was not taken, which is told once"
+    world.network.heal()
+    assert publisher.publish(Int32(data=4), timeout=2.0)
+    bob.spin(bob.executor(), 500)
+    assert got == [1, *[2] * alice.session.reliable.history, 4]
+
+
+def test_publish_waits_for_no_room_that_will_not_come() -> None:
+    world = World()
+    alice, _ = two(world)
+    publisher: Any = alice.node.publisher(Int32, "value")
+    quick: Any = alice.node.publisher(Int32, "quick", "sensor_data")
+    started = world.now
+    assert not quick.publish(Int32(data=1), timeout=1.0), "best effort waits for nothing"
+    assert world.now == started
+    alice.connect()
+    publisher.destroy()
+    started = world.now
+    assert not publisher.publish(Int32(data=1), timeout=1.0)
+    assert world.now == started
+
+
 def test_requests_and_answers_wait_for_theirs() -> None:
     world = World()
     alice, bob = two(world)

@@ -1,6 +1,7 @@
 """Contexts on spaces: who meets whom, what is refused, what a space reports."""
 
 import re
+import threading
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from muros.rclc.host.context import Context
 from muros.space import CDR_BE, Durability, History, Reliability, Space, Topic, open_space
 from muros.space import Qos as SpaceQos
 from muros.space.rclc import ENCODING, NETWORK, NOT_SPUN, OTHER, PROBLEMS, SpaceMiddleware
+from tests.rclc_space.ways import PATIENCE
 
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32, String
@@ -342,6 +344,28 @@ def test_a_full_reader_that_keeps_all_refuses(space: Space) -> None:
     assert publisher.publish(Int32(data=taken))
     talker.close()
     listener.close()
+
+
+def test_who_publishes_may_wait_for_room(space: Space) -> None:
+    keep_all = Qos(keep_all=True)
+    talker, listener = Context(space), Context(space)
+    got = listen(listener, qos=keep_all)
+    publisher = talker.node("talker").publisher(Int32, "value", keep_all)
+    problems: list[tuple[int, str]] = []
+    talker.on_problem(lambda code, text: problems.append((code, text)))
+    taken = 0
+    while publisher.publish(Int32(data=taken)):
+        taken += 1
+        assert taken < 100
+    assert not publisher.publish(Int32(data=-1), timeout=0.05)
+    assert len(problems) == 2, "both that were not taken are told, once"
+    spinning = threading.Thread(target=Executor(listener).spin, daemon=True)
+    spinning.start()
+    assert publisher.publish(Int32(data=taken), timeout=PATIENCE)
+    listener.close()
+    spinning.join(PATIENCE)
+    assert got[:taken] == list(range(taken))
+    talker.close()
 
 
 def test_publishing_without_spinning_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from muros.client import entities, services
 from muros.client import session as board
+from muros.client.link import CONNECTED
 from muros.compat import ticks_add, ticks_diff, ticks_ms
 
 if TYPE_CHECKING:
@@ -170,6 +171,23 @@ class Endpoint(board.Entity):
             taken = super().publish(message)
         self.session.hurry()
         return taken
+
+    def offer(self, message: Outgoing) -> bool | None:
+        """``publish``, but None, in place of a problem, where there may be room for the message later."""
+        with self.session.lock:
+            if self._crowded():
+                return None
+            return self.publish(message)
+
+    def _crowded(self) -> bool:
+        """Whether a reliable message has no room now, and may have later."""
+        session, stream = self.session, self.stream
+        if not stream.reliable or self.status or self not in session.entities:
+            return False
+        if session.backlog is not None:
+            return len(session.backlog.items) >= session.queue
+        ready = session.state == CONNECTED and self.todo == 0
+        return not session.queue and not (ready and stream.next - stream.first & 0xFFFF < stream.history)
 
     def destroy(self) -> None:
         """Has the agent delete it."""

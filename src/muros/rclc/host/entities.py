@@ -13,7 +13,7 @@ from muros.rclc.errors import RclError
 from muros.rclc.host.checks import WrongTypeError, be_callable, called, fits, other
 from muros.rclc.host.outlet import LOG_TOPIC, body, outlet
 from muros.rclc.host.sharing import call_elsewhere, hand_over
-from muros.rclc.host.waiting import wait_confirmed
+from muros.rclc.host.waiting import publish_confirmed, wait_confirmed
 
 if TYPE_CHECKING:
     from muros.rclc._types import Publisher as AnyPublisher
@@ -36,17 +36,18 @@ class Publisher:
         """Sends a message; False when it was not taken. Raises TypeError for one of another type.
 
         It waits for nothing, unless there is a ``timeout`` (None: ``session_timeout``): then so many seconds at most
-        until a reliable message is confirmed: by the agent, or straight in a space by every reader. False if it is not.
-        Callbacks must not wait.
+        until there is room for a reliable message and it is confirmed: by the agent, or straight in a space by every
+        reader. False if it is not. Callbacks must not wait.
         """
         if not isinstance(message, self._kind) and not fits(message, self._kind):
             raise other(message, self._kind, "publish")
         if outlet.task is not None and self.topic != LOG_TOPIC:
             return outlet.task.publish(self._writer, message)
-        taken = self._writer.publish(message)
         if timeout is None:
             timeout = self.session_timeout
-        return taken and (not timeout or wait_confirmed(self._node.context, self._writer, timeout))
+        if timeout:
+            return publish_confirmed(self._node.context, self._writer, message, timeout)
+        return self._writer.publish(message)
 
     def count_subscriptions(self) -> int:
         """Those that get what is published: through an agent all of the topic, see ``Node.graph``."""

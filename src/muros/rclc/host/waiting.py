@@ -6,12 +6,14 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from muros.client.link import CONNECTED
+from muros.client.raw import Raw
 from muros.compat import ticks_add, ticks_diff
+from muros.rclc.host.outlet import body
 
 if TYPE_CHECKING:
     from muros.rclc.context import Context
 
-__all__ = ["spin_until", "wait_confirmed"]
+__all__ = ["publish_confirmed", "spin_until", "wait_confirmed"]
 
 _LONG = 1_000_000
 """Milliseconds that one wait may take."""
@@ -38,6 +40,29 @@ def spin_until(
         if not condition():
             middleware.wait(min(left, longest, middleware.deadline(now)))
     return True
+
+
+def publish_confirmed(context: Context, writer: Any, message: Any, timeout: float) -> bool:
+    """Publishes a message when there is room for it, and waits until it is confirmed: ``timeout`` seconds in all.
+
+    False when that takes longer; what was not taken by then is not sent, and told.
+    """
+    offer = getattr(writer, "offer", writer.publish)
+    end = ticks_add(context.clock(), int(timeout * 1000))
+    sample = message if hasattr(message, "piece") else Raw(body(message))
+    taken: bool | None = None
+
+    def offered() -> bool:
+        nonlocal taken
+        if taken is None:
+            taken = offer(sample)
+        return taken is not None
+
+    if not spin_until(context, offered, timeout, _SOON):
+        writer.publish(sample)
+        return False
+    left = ticks_diff(end, context.clock()) / 1000
+    return bool(taken) and wait_confirmed(context, writer, left)
 
 
 def wait_confirmed(context: Context, writer: Any, timeout: float) -> bool:

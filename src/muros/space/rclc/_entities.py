@@ -26,6 +26,9 @@ __all__ = ["LONGEST_NAME", "Node", "Publisher", "Reader", "Receiver", "Replier",
 LONGEST_NAME: Final = 255
 """Longest name of a topic, type or node, in characters: that of ROS 2's middlewares."""
 
+READER_FULL: Final = "a reliable reader that keeps all is full. Publish less often, or try again."
+"""Why a sample was not taken that may be taken later."""
+
 _AT_ONCE: Final = 64
 """Samples that one reader hands on before the others have their turn."""
 
@@ -112,19 +115,27 @@ class Publisher(_Entity):
         with self._lock:
             return self.entity.closed or self.entity.acknowledged
 
+    def offer(self, message: Outgoing, /) -> bool | None:
+        """``publish``, but None, in place of a problem, where there may be room for the message later."""
+        why = self._write(encode(message))
+        return None if why == READER_FULL else not why
+
     def write_bytes(self, data: bytes) -> bool:
         """Sends a sample that is serialised already."""
+        why = self._write(data)
+        return not why or self.refuse(FULL if why == READER_FULL else OFFLINE, len(data), why)
+
+    def _write(self, data: bytes) -> str:
+        """Sends a sample; why it was not taken, empty if it was."""
         with self._lock:
             why = self.gone()
-            if not why and self.entity.write(data):
-                if self.context.state != CONNECTED:
-                    self.context.be_spun(self.name)
-                return True
-        if why:
-            return self.refuse(OFFLINE, len(data), why)
-        return self.refuse(
-            FULL, len(data), "a reliable reader that keeps all is full. Publish less often, or try again."
-        )
+            if why:
+                return why
+            if not self.entity.write(data):
+                return READER_FULL
+            if self.context.state != CONNECTED:
+                self.context.be_spun(self.name)
+        return ""
 
 
 class Receiver(_Entity):
