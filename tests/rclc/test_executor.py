@@ -530,6 +530,25 @@ def test_x28_x29_x30_services(bench: Bench) -> None:
     assert {len(identity) for identity in seen} == {24}
 
 
+def test_a_request_is_answered_once(bench: Bench) -> None:
+    service = bench.context.node("server").service(AddTwoInts, "add", lambda request: None)
+    client = bench.talker.node("client").client(AddTwoInts, "add")
+    bench.settle()
+    answers: list[Any] = []
+    assert client.send(AddTwoInts.Request(), answers.append, timeout=1.0)
+    bench.settle()
+    assert bench.executor().spin_some(0.1)
+    for number in (1, 2):
+        service.reply(service.identity, AddTwoInts.Response(sum=number))
+        bench.settle()
+    asking = Executor(bench.talker)
+    while asking.spin_some(0.1):
+        pass
+    bench.take(2000)
+    assert not asking.spin_some(0.1)
+    assert [answer.sum for answer in answers] == [1]
+
+
 def test_x31_a_callback_with_a_context_is_a_closure(bench: Bench) -> None:
     topics = Topics(bench, 1)
     got: list[tuple[int, int]] = []
