@@ -143,7 +143,7 @@ def test_a_tool_ticks(world: World, kind: str) -> None:
     (context,) = component.get_owned_contexts()
     context = context._narrow(OpenRTM.ExtTrigExecutionContextService)
     assert context.activate_component(component) == RTC.RTC_OK
-    assert "Ticked0 activated 0" in world.managers.said(process)
+    wait_until(lambda: "Ticked0 activated 0" in world.managers.said(process))
     ticks = 0
     while "Ticked0 ran" not in world.managers.said(process):
         context.tick()

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 _LOW = 10
-"""The niceness of what goes on with low priority."""
+"""How much nicer than the program is what goes on with low priority."""
 
 
 class HostTask(Task):
@@ -249,7 +249,7 @@ class _Worker:
             return
         with suppress(AttributeError, OSError):
             os.sched_setscheduler(number, os.SCHED_OTHER, os.sched_param(0))
-            os.setpriority(os.PRIO_PROCESS, number, _LOW)
+            os.setpriority(os.PRIO_PROCESS, number, os.getpriority(os.PRIO_PROCESS, 0) + _LOW)
 
     def _work(self) -> None:
         while (order := self.orders.get()) is not None:
