@@ -1,6 +1,6 @@
 """Calls SimpleService::MyService of whoever provides it, once in each cycle."""
 
-from muros.rtc import Component, NotConnectedError, Required, run
+from muros.rtc import Component, NotConnectedError, PeerLostError, Required, run
 
 
 class MyServiceConsumer(Component):
@@ -22,7 +22,7 @@ class MyServiceConsumer(Component):
         try:
             print(self.service.echo(f"hello {self.count}"), flush=True)
             self.service.set_value(float(self.count))
-        except NotConnectedError as error:
+        except (NotConnectedError, PeerLostError) as error:  # nobody provides it, or not at this moment
             print(error, flush=True)
         self.count += 1
 

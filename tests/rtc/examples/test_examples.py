@@ -136,6 +136,7 @@ def test_service(managers: Managers, world: CorbaWorld) -> None:
     activate(world, "MyServiceConsumer0")
     managers.wait_for(consumer, "onnect")  # it says that it is not connected
     connect(world, "MyServiceProvider0.MyService", "MyServiceConsumer0.MyService")
+    managers.wait_for(consumer, "the provider is not active")
     activate(world, "MyServiceProvider0")
     managers.wait_for(provider, "echo: hello ")
     managers.wait_for(consumer, "\nhello ")
