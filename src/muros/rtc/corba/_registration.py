@@ -59,24 +59,12 @@ class Registration:
             except RtcError as error:
                 self._tell(name, str(error), "Mend naming.formats")
                 continue
-            if self.is_free(name):
-                self._change(partial(self._names.bind, name, reference))
-                continue
-            with self._lock:
-                self._waiting[name] = reference
-            self._tell(
-                name,
-                "another component that lives has this name",
-                "Give it another instance_name, or end the other one: it is bound as soon as the name is free",
-            )
+            self._change(partial(self._bind, name, reference))
 
     def unbind(self, names: Iterable[str]) -> None:
         """Give names back."""
         for name in names:
-            with self._lock:
-                waited = self._waiting.pop(name, None)
-            if waited is None:
-                self._change(partial(self._names.unbind, name))
+            self._change(partial(self._unbind, name))
 
     def update(self) -> None:
         """Bind what servers lack."""
@@ -85,10 +73,7 @@ class Registration:
             with self._lock:
                 waiting = dict(self._waiting)
             for name, reference in waiting.items():
-                if self.is_free(name):
-                    self._names.bind(name, reference)
-                    with self._lock:
-                        self._waiting.pop(name, None)
+                self._bind(name, reference)
 
     def close(self) -> None:
         """Give all names back; a server that is silent is waited for a little."""
@@ -101,7 +86,10 @@ class Registration:
 
     def is_free(self, name: str) -> bool:
         """Whether no living object of others has the name at any server that answers."""
-        for server in self._answering():
+        return self._is_free(name, self._answering())
+
+    def _is_free(self, name: str, servers: Iterable[NameServer]) -> bool:
+        for server in servers:
             with self._noted(server):
                 bound = server.resolve(name)
                 if not is_same(bound, self._names.bound.get(name)) and not _has_gone(bound):
@@ -158,6 +146,30 @@ class Registration:
             with contextlib.suppress(RuntimeError):  # closed already
                 self._last = self._background.submit(made)
 
+    def _bind(self, name: str, reference: Any) -> None:
+        """Bind a name that nobody else has at this moment; one that somebody has waits."""
+        free = self._is_free(name, self.servers)
+        if free:
+            self._names.bind(name, reference)
+        with self._lock:
+            if free:
+                self._waiting.pop(name, None)
+                return
+            new = name not in self._waiting
+            self._waiting[name] = reference
+        if new:
+            self._tell(
+                name,
+                "another component that lives has this name",
+                "Give it another instance_name, or end the other one: it is bound as soon as the name is free",
+            )
+
+    def _unbind(self, name: str) -> None:
+        with self._lock:
+            waited = self._waiting.pop(name, None)
+        if waited is None:
+            self._names.unbind(name)
+
     def _tell(self, name: str, why: str, remedy: str) -> None:
         self._reporter.report(
             "name-not-bound", who="naming", what=f"{name} is not bound", why=why, remedy=remedy, subject=name
@@ -177,8 +189,14 @@ def _has_gone(reference: Any | None) -> bool:
 @contextlib.contextmanager
 def patience(seconds: float) -> Iterator[None]:
     """Calls of this thread to other processes take no longer than that, inside the block."""
+    before: float = getattr(_patient, "seconds", 0.0)
+    _patient.seconds = seconds
     omniORB.setClientThreadCallTimeout(round(seconds * 1000))
     try:
         yield
     finally:
-        omniORB.setClientThreadCallTimeout(0)
+        _patient.seconds = before
+        omniORB.setClientThreadCallTimeout(round(before * 1000))
+
+
+_patient: Final = threading.local()
