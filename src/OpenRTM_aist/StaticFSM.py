@@ -123,6 +123,10 @@ class Machine(_Machine):
             return super().dispatch(event.name, *event.arguments)
         return super().dispatch(event, *arguments)
 
+    def shutdown(self) -> None:
+        """End: the states are left."""
+        self.stop()
+
     def getComp(self) -> Any:
         return self.component
 

@@ -8,6 +8,7 @@ muros component (`_Behind`) that contexts, ports and other processes know, and t
 from __future__ import annotations
 
 import logging
+import traceback
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -17,6 +18,8 @@ from muros.rtc.component import Component
 from muros.rtc.configuration import ConfigEvent
 from muros.rtc.manager._logger import LEVELS, LOGGER_NAME
 from muros.rtc.ports import Port
+from OpenRTM_aist._adapter import Adapter
+from OpenRTM_aist._config_admin import ConfigAdmin
 from OpenRTM_aist._data_ports import InPort, OutPort
 from OpenRTM_aist._ports import PortBase
 from OpenRTM_aist._properties import Properties
@@ -238,6 +241,11 @@ class Logger:
                 text = f"{message} {values!r}"
             self._log.log(number, "%s", text)
 
+    @staticmethod
+    def print_exception() -> str:
+        """The error that is being handled, with its way through the program, as a text for the log."""
+        return traceback.format_exc()
+
     def RTC_LOG(self, level: str, message: str, arguments: Any = None) -> None:
         self.write(level.upper(), message, arguments)
 
@@ -353,6 +361,13 @@ class RTObject_impl:  # noqa: N801
         """The reference that others call; None before they know the component."""
         return self._manager.reference_of(self) if self._manager is not None else None
 
+    def _this(self) -> Any:
+        return self.getObjRef()
+
+    def _default_POA(self) -> Adapter:
+        """What gives the component's reference to programs that see a servant in it."""
+        return Adapter(None)
+
     def getManager(self) -> Any:
         return self._manager
 
@@ -415,7 +430,10 @@ class RTObject_impl:  # noqa: N801
 
         def convert(text: str) -> Any:
             made = list(kind)
-            if convert_in_place(made, text) is False:
+            answer = convert_in_place(made, text)
+            if isinstance(answer, tuple):  # as version 2 has it: whether it can be, and the value
+                answer, made[0] = answer
+            if answer is False:
                 raise ValueError(f"{text!r} is no {type(kind[0]).__name__ if kind else 'value'}")
             return made[0]
 
@@ -424,6 +442,14 @@ class RTObject_impl:  # noqa: N801
 
         self._behind.configuration.bind(param_name, def_val, convert, assign)
         return True
+
+    @property
+    def _configsets(self) -> ConfigAdmin:
+        return ConfigAdmin(self._behind.configuration)
+
+    def getConfigService(self) -> ConfigAdmin:
+        """The configuration."""
+        return self._configsets
 
     def updateParameters(self, config_set: str) -> None:
         """Take a set's values over now."""

@@ -30,6 +30,7 @@ __all__ = [
     "OnWriteConvert",
     "OutPort",
     "OutPortBase",
+    "PortType",
     "RingBuffer",
     "instantiateDataType",
 ]
@@ -116,6 +117,12 @@ class DataPortStatus:
         return Status(status).name
 
 
+class PortType:
+    """Which side of a connection a listener hears of."""
+
+    OutPortType, InPortType, PortTypeNum = range(3)
+
+
 class ConnectorInfo:
     """A connection, as listeners see it."""
 
@@ -135,9 +142,11 @@ class ConnectorDataListener:
 
 class ConnectorDataListenerT(ConnectorDataListener):
     """As above. Components that decode by themselves call this `__call__` with what they were given and a value of
-    the data type, and get the value."""
+    the data type, and get the value; what version 2 adds, a `PortType`, changes nothing."""
 
-    def __call__(self, info: ConnectorInfo, cdrdata: Any, data: Any = None) -> Any:  # type: ignore[override]
+    def __call__(  # type: ignore[override]
+        self, info: ConnectorInfo, cdrdata: Any, data: Any = None, porttype: int = PortType.InPortType
+    ) -> Any:
         if isinstance(cdrdata, (bytes, bytearray)) and data is not None:
             endian = info.properties.getProperty("serializer.cdr.endian", "little")
             return data_type_of(type(data)).decode(bytes(cdrdata), endian.split(",")[0].strip() != "big")

@@ -18,7 +18,9 @@ from muros.rtc.component import Component
 from muros.rtc.manager import Manager as Core
 from muros.rtc.manager import ended_by_signals, parse_options, read_settings
 from muros.rtc.properties import ConfError
+from OpenRTM_aist._adapter import Adapter
 from OpenRTM_aist._components import Logger, RTObject_impl, _Behind
+from OpenRTM_aist._naming_manager import NamingManager
 from OpenRTM_aist._properties import Properties
 
 __all__ = ["Manager"]
@@ -195,6 +197,11 @@ class Manager:
     def unload(self, fname: str) -> None:
         self.core.unload_module(fname)
 
+    def unloadAll(self) -> None:
+        """Forget all modules."""
+        for module in self.core.modules.loaded:
+            self.core.unload_module(str(module.path))
+
     def getLoadedModules(self) -> list[Properties]:
         return [Properties.of(module.properties()) for module in self.core.modules.loaded]
 
@@ -212,6 +219,10 @@ class Manager:
     def getLogbuf(self, name: str = "manager") -> Logger:
         return Logger(name)
 
+    def getNaming(self) -> NamingManager:
+        """What finds components by their addresses."""
+        return NamingManager(self.core)
+
     def getORB(self) -> Any:
         """The ORB, as omniORB has it."""
         from omniORB import CORBA
@@ -221,7 +232,8 @@ class Manager:
     theORB = getORB
 
     def getPOA(self) -> Any:
-        return self.getORB().resolve_initial_references("RootPOA")
+        """The ORB's root adapter, which knows components, too."""
+        return Adapter(self.getORB().resolve_initial_references("RootPOA"))
 
     thePOA = getPOA
 

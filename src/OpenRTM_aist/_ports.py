@@ -9,7 +9,13 @@ from typing import Any
 from muros.rtc.ports import ConnectEvent, ConnectEventKind, Port
 from OpenRTM_aist._properties import Properties
 
-__all__ = ["PortBase", "PortConnectListenerType", "PortConnectRetListenerType"]
+__all__ = [
+    "PortBase",
+    "PortConnectListener",
+    "PortConnectListenerType",
+    "PortConnectRetListener",
+    "PortConnectRetListenerType",
+]
 
 
 class PortConnectListenerType:
@@ -38,6 +44,18 @@ class PortConnectRetListenerType:
     @staticmethod
     def event(number: int) -> ConnectEventKind:
         return tuple(ConnectEventKind)[number + PortConnectListenerType.PORT_CONNECT_LISTENER_NUM]
+
+
+class PortConnectListener:
+    """Base of listeners: override `__call__(port name, profile)`."""
+
+    def __call__(self, portname: str, profile: Any) -> None: ...
+
+
+class PortConnectRetListener:
+    """Base of listeners: override `__call__(port name, profile, return code)`."""
+
+    def __call__(self, portname: str, profile: Any, ret: Any) -> None: ...
 
 
 class PortBase:
@@ -78,6 +96,24 @@ class PortBase:
 
     def getConnectorProfileByName(self, name: str) -> Any:
         return next((one for one in self.port.connectors if one.name == name), None)
+
+    # What others may ask of the port, for those that ask it here
+
+    def get_port_profile(self) -> Any:
+        return self.getPortRef().get_port_profile()
+
+    def get_connector_profiles(self) -> list[Any]:
+        return list(self.getPortRef().get_connector_profiles())
+
+    def get_connector_profile(self, connector_id: str) -> Any:
+        return self.getPortRef().get_connector_profile(connector_id)
+
+    def connect(self, connector_profile: Any) -> Any:
+        """Make a connection; the return code and the profile."""
+        return self.getPortRef().connect(connector_profile)
+
+    def disconnect(self, connector_id: str) -> Any:
+        return self.getPortRef().disconnect(connector_id)
 
     def disconnect_all(self) -> Any:
         return self.port.disconnect_all()

@@ -36,9 +36,9 @@ __all__ = [
 ]
 
 
-def eraseBlank(text: str) -> str:
-    """Without blanks."""
-    return re.sub(r"[ \t]", "", text)
+def eraseBlank(text: Any) -> Any:
+    """Without blanks; a one-element list is changed in its place."""
+    return _in_place(text, lambda one: re.sub(r"[ \t]", "", one))
 
 
 def eraseHeadBlank(text: Any) -> Any:
@@ -144,22 +144,17 @@ def toString(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, (list, tuple)) else str(value)
 
 
-def stringTo(variable: list[Any], text: str) -> bool:
-    """Put `text`, as the type of what is in the one-element list, into it. False where it cannot be."""
+def stringTo(variable: Any, text: str) -> Any:
+    """Put `text`, as the type of what is in the one-element list `variable`, into it. False where it cannot be.
+
+    As in version 2, a value that is no list is answered with: whether it can be, and the value then.
+    """
+    if not isinstance(variable, list):
+        return _converted(variable, text)
     if not variable:
         return False
-    now = variable[0]
-    try:
-        if isinstance(now, (list, tuple)):
-            kind = type(now[0]) if now else str
-            variable[0] = [kind(part.strip()) for part in text.split(",") if part.strip()]
-        elif isinstance(now, bool):
-            variable[0] = type(now)(int(text))
-        else:
-            variable[0] = type(now)(text)
-    except (TypeError, ValueError):
-        return False
-    return True
+    there, variable[0] = _converted(variable[0], text)
+    return there
 
 
 def setTimestamp(data: Any) -> None:
@@ -217,6 +212,17 @@ class Time:
 
     def getTime(self) -> TimeValue:
         return TimeValue(*self.gettimeofday())
+
+
+def _converted(now: Any, text: str) -> tuple[bool, Any]:
+    """Whether `text` can be of the type of `now`, and the value; else `now`."""
+    try:
+        if isinstance(now, (list, tuple)):
+            kind = type(now[0]) if now else str
+            return True, [kind(part.strip()) for part in text.split(",") if part.strip()]
+        return True, type(now)(int(text)) if isinstance(now, bool) else type(now)(text)
+    except (TypeError, ValueError):
+        return False, now
 
 
 def _in_place(text: Any, change: Callable[[str], str]) -> Any:

@@ -54,6 +54,12 @@ class Program:
         self.process.stdin.write(f"{line}\n")
         self.process.stdin.flush()
 
+    def over(self) -> int:
+        """Wait until it has ended by itself; its status."""
+        status = self.process.wait(PATIENCE)
+        self._reader.join(PATIENCE)
+        return status
+
     def end(self) -> int:
         """End it by SIGTERM; its status."""
         if self.process.stdin is not None and not self.process.stdin.closed:

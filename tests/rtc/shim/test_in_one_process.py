@@ -118,7 +118,8 @@ def test_an_error_in_an_action_is_the_error_state(manager: rtm.Manager) -> None:
 
     failing = make(manager, Failing)
     assert failing.activate(0) != RTC.RTC_OK
-    assert rtm.CORBA_RTCUtil.get_state(failing.getObjRef()) == RTC.ERROR_STATE
+    assert rtm.CORBA_RTCUtil.get_state(failing.getObjRef()) == (True, RTC.ERROR_STATE)
+    assert rtm.CORBA_RTCUtil.is_in_error(failing.getObjRef())
     assert failing.reset(0) == RTC.RTC_OK
     assert failing.exit() == RTC.RTC_OK
 

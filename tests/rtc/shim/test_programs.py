@@ -115,3 +115,67 @@ def test_all_in_a_daemon_by_their_modules(stage: Stage) -> None:
         assert profile.instance_name == name
         assert profile.category == "example"
         assert profile.vendor == "muros"
+
+
+def test_a_program_finds_components_and_works_them(stage: Stage) -> None:
+    """Each function that manuals of OpenRTM-aist-Python 2 tell of."""
+    for name in ("ConsoleIn", "ConsoleOut", "ConfigSample", "MyServiceProvider"):
+        stage.python(name)
+        stage.component(f"{name}0")
+    program = stage.python("Operator", stage.names)
+    assert program.over() == 0, program.lines
+    told = program.lines[program.lines.index("nowhere []") :]
+    assert told[:21] == [
+        "nowhere []",
+        "ports 0 0",
+        "connect RTC_OK",
+        "names ['first']",
+        "names ['first']",
+        "joined True",
+        "again RTC_OK",
+        "end RTC_OK",
+        "multi RTC_OK",
+        "end RTC_OK",
+        "by name RTC_OK",
+        "activate RTC_OK",
+        "state True ACTIVE_STATE True False",
+        "deactivate RTC_OK PRECONDITION_NOT_MET",
+        "rate 20.0",
+        "rate 50.0",
+        "attach RTC_OK",
+        "participant 0 ConsoleIn0",
+        "detach RTC_OK []",
+        "set True",
+        "set True",
+    ]
+    assert {"set False", "active mode1", "int_param0: 12345", "str_param0: test", "default 7"} < set(told)
+    assert told[-5:] == [
+        "key 12345",
+        "in ['ConsoleOut0.in'] out ['ConsoleIn0.out']",
+        "service ['MyServiceProvider0.MyService'] all ['MyServiceProvider0.MyService']",
+        "all gone RTC_OK",
+        "names []",
+    ]
+
+
+def test_a_program_without_a_manager_connects(stage: Stage) -> None:
+    console_in, console_out = stage.python("ConsoleIn"), stage.python("ConsoleOut")
+    for name in ("ConsoleIn0", "ConsoleOut0"):
+        stage.component(name)
+    program = stage.python("Connector", stage.names)
+    assert program.over() == 0, program.lines
+    assert program.lines[-1] == "connected RTC_OK flush"
+    console_out.said("activated at 100.0")
+    console_in.type("21")
+    console_out.said("Received: 42")
+
+
+def test_a_component_that_starts_itself(stage: Stage) -> None:
+    program = stage.python("SelfStarter")
+    program.said("active set default 2")
+    program.said("same True")
+    program.said("written True 1")
+    program.said("listener loop 5")
+    program.said("received 105")
+    program.said("finished SelfStarter0")
+    assert program.end() == 0
