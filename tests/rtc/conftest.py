@@ -15,7 +15,7 @@ from muros.rtc.corba import Orb, RunningNameServer, start_name_server, start_orb
 @pytest.fixture(scope="session")
 def orb() -> Iterator[Orb]:
     """The ORB, on loopback. One for the whole process: tests leave it running."""
-    running = start_orb("127.0.0.1:")
+    running = start_orb("127.0.0.1:", connect_timeout=1.0)
     yield running
     running.shutdown()
 

@@ -102,7 +102,7 @@ WRITER = """
 import sys
 from muros.rtc import Component, OutPort
 from muros.rtc.corba import set_up, start_orb
-orb = start_orb("127.0.0.1:", call_timeout=0.3)
+orb = start_orb("127.0.0.1:", call_timeout=0.3, connect_timeout=0.3)
 objects = set_up(orb)
 import RTC
 from muros.rtc.corba._conversion import to_nv_list

@@ -2,6 +2,7 @@
 
 import os
 import queue
+import signal
 import subprocess
 import sys
 import threading
@@ -14,9 +15,9 @@ import pytest
 from muros.findings import Finding
 from muros.rtc import Component, InPort, OutPort, Parameter
 from muros.rtc.codes import DataPortStatus
-from muros.rtc.corba import NameServer, Objects, Orb, RunningNameServer, set_up
+from muros.rtc.corba import NameServer, Objects, Orb, RunningNameServer, _port, set_up
 from muros.rtc.corba._conversion import texts_of, to_nv_list
-from muros.rtc.corba._lost import asked_again
+from muros.rtc.corba._lost import asked_again, quick_answer
 from muros.rtc.corba._stubs import RTC, OpenRTM, OpenRTM__POA, SDOPackage
 
 WAIT = 10.0
@@ -531,6 +532,27 @@ def test_a_foreign_component_that_ends_is_forgotten(pair: Pair, start: Start) ->
     assert pair.out.connect(request(pair.out, their_in, **PUSH))[0] != RTC.RTC_OK
     assert pair.inp.connect(request(pair.inp, their_out, **PUSH))[0] != RTC.RTC_OK
     assert pair.out.get_connector_profiles() == pair.inp.get_connector_profiles() == []
+
+
+def test_a_peer_that_stands_still_keeps_its_connections_for_some_time(
+    pair: Pair, start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Who looks at connections does not end those of a process that is only slow."""
+    monkeypatch.setattr(_port, "quick_answer", lambda: quick_answer(0.2))
+    foreign, reference = start("Foreign0")
+    _, their_out = reference.get_ports()
+    assert pair.inp.connect(request(pair.inp, their_out, **PUSH))[0] == RTC.RTC_OK
+    foreign.process.send_signal(signal.SIGSTOP)
+    for _ in range(_port.PATIENCE - 1):
+        assert len(pair.inp.get_connector_profiles()) == 1
+    foreign.process.send_signal(signal.SIGCONT)
+    foreign.write(3)
+    assert foreign.line() == "status PORT_OK"
+    assert len(pair.inp.get_connector_profiles()) == 1
+    foreign.process.send_signal(signal.SIGSTOP)
+    for _ in range(_port.PATIENCE):
+        pair.inp.get_connector_profiles()
+    assert pair.sink.ports[0].connectors == ()
 
 
 def test_our_context_runs_a_foreign_component(pair: Pair, start: Start) -> None:

@@ -11,7 +11,7 @@ from omniORB import CORBA
 
 from muros.rtc.codes import PeerLostError, RtcError
 
-__all__ = ["LOST", "asked_again", "describe", "peer", "quick_answer"]
+__all__ = ["LOST", "asked_again", "describe", "is_late", "peer", "quick_answer"]
 
 T = TypeVar("T")
 
@@ -53,6 +53,11 @@ def quick_answer(seconds: float = QUICK_SECONDS) -> Iterator[None]:
         yield
     finally:
         omniORB.setClientThreadCallTimeout(0)
+
+
+def is_late(error: BaseException) -> bool:
+    """Whether a call has ended because there was no answer in time: the other side may be there and busy."""
+    return isinstance(error, CORBA.SystemException) and "CallTimed" in omniORB.minorCodeToString(error)
 
 
 def describe(error: BaseException) -> str:

@@ -64,6 +64,7 @@ def start_orb(
             "muros",
             *("-ORBclientCallTimeOutPeriod", str(round(call_timeout * 1000))),
             *("-ORBclientConnectTimeOutPeriod", str(round(connect_timeout * 1000))),
+            *("-ORBsupportPerThreadTimeOut", "1"),
             *("-ORBinConScanPeriod", "0"),
             *("-ORBgiopMaxMsgSize", str(max_message)),
             *("-ORBnativeCharCodeSet", "UTF-8"),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from omniORB import CORBA
 
-from muros.rtc.codes import Polarity, ReturnCode, RtcError
+from muros.rtc.codes import PeerLostError, Polarity, ReturnCode, RtcError
 from muros.rtc.corba._conversion import (
     from_nv_list,
     from_return_code,
@@ -15,7 +16,7 @@ from muros.rtc.corba._conversion import (
     to_return_code,
 )
 from muros.rtc.corba._foreign import ForeignComponent
-from muros.rtc.corba._lost import asked_again, peer, quick_answer
+from muros.rtc.corba._lost import asked_again, is_late, peer, quick_answer
 from muros.rtc.corba._naming import is_same
 from muros.rtc.corba._stubs import RTC, RTC__POA
 from muros.rtc.ports import Port
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from muros.rtc.corba._objects import Objects
 
 __all__ = ["ForeignPort", "PortServant"]
+
+PATIENCE: Final = 3
+"""Times that a port is asked whether it exists until its silence counts as an answer."""
 
 
 class PortServant(RTC__POA.PortService):  # type: ignore[misc]
@@ -80,12 +84,13 @@ class ForeignPort:
     What it does not answer raises PeerLostError, what its ORB refuses RtcError.
     """
 
-    __slots__ = ("_hash", "_objects", "reference")
+    __slots__ = ("_hash", "_late", "_objects", "reference")
 
     def __init__(self, reference: Any, objects: Objects) -> None:
         self.reference: Final = reference
         self._objects = objects
         self._hash = objects.orb.hash_of(reference)
+        self._late = 0
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, ForeignPort) and is_same(self.reference, other.reference)
@@ -102,15 +107,22 @@ class ForeignPort:
         return from_return_code(code), replace(profile, name=agreed.name, properties=properties)
 
     def notify_disconnect(self, connector_id: str) -> ReturnCode:
-        with peer(str(self)):
+        """One that did not answer when it was last looked for is not waited for long."""
+        if self._late >= PATIENCE:
+            raise PeerLostError(f"{self} has been silent for long")
+        with peer(str(self)), quick_answer() if self._late else nullcontext():
             return from_return_code(asked_again(lambda: self.reference.notify_disconnect(connector_id)))
 
     def is_there(self) -> bool:
+        """Whether its process says so. One that does not answer in time is given PATIENCE looks."""
         try:
             with quick_answer():
-                return not asked_again(self.reference._non_existent)
-        except CORBA.Exception:
-            return False
+                there = not asked_again(self.reference._non_existent)
+        except CORBA.Exception as error:
+            self._late += 1
+            return is_late(error) and self._late < PATIENCE
+        self._late = 0
+        return there
 
     # As a port that a composite of this process exports: what tools see of it is what it says itself.
 

@@ -16,7 +16,7 @@ from omniORB import CORBA
 
 from muros.findings import Finding
 from muros.rtc.codes import PeerLostError, PortStatus, RtcError
-from muros.rtc.corba._lost import LOST, describe
+from muros.rtc.corba._lost import LOST, describe, is_late
 from muros.rtc.corba._orb import Orb
 from muros.rtc.corba._stubs import RTC, RTC__POA, OpenRTM, OpenRTM__POA
 from muros.rtc.data import Connection, Get, Inlet, Offer, Outlet, Put, TransportError
@@ -146,7 +146,7 @@ class _Caller:
         text = describe(error)
         if isinstance(error, LOST):
             self._late += 1
-            if "CallTimed" in text and self._late < 2:
+            if is_late(error) and self._late < 2:
                 return PortStatus.BUFFER_TIMEOUT
             raise PeerLostError(f"{self._connection.port_name}: the peer does not answer: {text}") from error
         self._connection.report(
