@@ -13,6 +13,7 @@ from muros.rtc.configuration import (
     ConfigurationError,
     ConfigurationSet,
     EmptyIdError,
+    FullError,
     NotAvailableError,
     UnknownSetError,
     converter_of,
@@ -182,6 +183,21 @@ def test_texts_become_values_of_the_defaults_type(like: object, text: str, value
     converted = converter_of(like)(text)
     assert converted == value
     assert type(converted) is type(value)
+
+
+def test_a_stranger_cannot_fill_the_memory() -> None:
+    configuration = Configuration({"default": {"gain": "1"}}, size_limit=2000)
+    for number in range(8):
+        assert configuration.add(ConfigurationSet(f"s{number}", "", {"x": ""}))
+    with pytest.raises(FullError, match="'s8': all sets together would have more than 2000 characters"):
+        configuration.add(ConfigurationSet("s8", "", {"x": ""}))
+    with pytest.raises(FullError):
+        configuration.set_values(ConfigurationSet("default", "", {"gain": "1" * 2000}))
+    with pytest.raises(FullError):
+        configuration.set_values(ConfigurationSet("default", "", {str(n): "" for n in range(20)}))
+    assert configuration.get("default").values == {"gain": "1"}
+    assert configuration.remove("s0")
+    assert configuration.set_values(ConfigurationSet("default", "", {"gain": "2"}))
 
 
 def test_what_cannot_be_bound_is_refused() -> None:

@@ -26,6 +26,7 @@ __all__ = [
     "ConfigurationError",
     "ConfigurationSet",
     "EmptyIdError",
+    "FullError",
     "NotAvailableError",
     "Parameter",
     "UnknownSetError",
@@ -37,6 +38,11 @@ DEFAULT_SET: Final = "default"
 
 HIDDEN: Final = "_"
 """Sets whose names begin so are remarks for editors (`__widget__`, `__constraints__`); they cannot be activated."""
+
+SIZE_LIMIT: Final = 4 << 20
+"""Characters of all sets together that can be set from outside; each set and each parameter counts as 100 more."""
+
+ENTRY_SIZE: Final = 100
 
 T = TypeVar("T")
 
@@ -55,6 +61,10 @@ class UnknownSetError(ConfigurationError):
 
 class ActivationError(ConfigurationError):
     """The set cannot be activated: it is hidden or unknown (SDOPackage::InternalError)."""
+
+
+class FullError(ConfigurationError):
+    """More is to be stored than a configuration takes (SDOPackage::InternalError)."""
 
 
 class NotAvailableError(ConfigurationError):
@@ -83,6 +93,12 @@ class ConfigurationSet:
     def copy(self) -> ConfigurationSet:
         """One that may be changed without this one changing."""
         return ConfigurationSet(self.id, self.description, dict(self.values))
+
+    @property
+    def size(self) -> int:
+        """What it counts for in the configuration's limit."""
+        texts = sum(ENTRY_SIZE + len(name) + len(text) for name, text in self.values.items())
+        return ENTRY_SIZE + len(self.id) + len(self.description) + texts
 
 
 class Parameter(Generic[T]):
@@ -132,12 +148,14 @@ class Configuration:
         sets: Mapping[str, Mapping[str, str]] | None = None,
         *,
         active: str = "",
+        size_limit: int = SIZE_LIMIT,
         on_bad_text: Callable[[Parameter[Any], Exception], object] = lambda parameter, error: None,
         on_error: Callable[[ConfigEvent, Exception], object] = lambda event, error: None,
     ) -> None:
         self._sets = {id_: ConfigurationSet(id_, "", dict(values)) for id_, values in (sets or {}).items()}
         self._sets.setdefault(DEFAULT_SET, ConfigurationSet(DEFAULT_SET))
         self._added: set[str] = set()
+        self._size_limit: Final = size_limit
         self._active = active if active in self._sets and not active.startswith(HIDDEN) else DEFAULT_SET
         self._changed = True  # the first values are taken over by the first update
         self._in_force = True
@@ -203,7 +221,7 @@ class Configuration:
     def set_values(self, given: ConfigurationSet) -> bool:
         """Store the texts of `given` in the set of its id; parameters that nobody bound are stored, too.
 
-        They come into force by `activate`. False where there is no such set. Raises EmptyIdError.
+        They come into force by `activate`. False where there is no such set. Raises EmptyIdError, FullError.
         """
         with self._lock:
             if not given.id:
@@ -211,6 +229,7 @@ class Configuration:
             standing = self._sets.get(given.id)
             if standing is None:
                 return False
+            self._make_sure_of_room(given)
             if given.description:
                 standing.description = given.description
             standing.values.update(given.values)
@@ -219,12 +238,13 @@ class Configuration:
         return True
 
     def add(self, given: ConfigurationSet) -> bool:
-        """Add a set; False where one of that id stands. Raises EmptyIdError."""
+        """Add a set; False where one of that id stands. Raises EmptyIdError, FullError."""
         with self._lock:
             if not given.id:
                 raise EmptyIdError("the id of the configuration set is empty")
             if given.id in self._sets:
                 return False
+            self._make_sure_of_room(given)
             self._sets[given.id] = given.copy()
             self._added.add(given.id)
             self._set_aside()
@@ -288,6 +308,13 @@ class Configuration:
         if taken:
             self.listeners.tell(ConfigEvent.UPDATE_CONFIG_SET, active)
         return bool(taken)
+
+    def _make_sure_of_room(self, given: ConfigurationSet) -> None:
+        if sum(one.size for one in self._sets.values()) + given.size > self._size_limit:
+            raise FullError(
+                f"configuration set {given.id[:80]!r}: all sets together would have more than {self._size_limit} "
+                "characters; remove sets that nobody needs"
+            )
 
     def _set_aside(self) -> None:
         self._changed = True
