@@ -4,6 +4,7 @@ What has no case here has one elsewhere: R22 with the epoch, R24 with the memory
 """
 
 import json
+import threading
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
@@ -495,6 +496,11 @@ def test_r23_guard_condition(stage: Stage) -> None:
     stage.until(lambda: calls)
     assert not stage.executors[0].spin_some(0.001), "it is reset by itself"
     assert calls == [1]
+    end = node.context.clock() + 1000 * PATIENCE
+    threading.Timer(0.05, guard.trigger).start()
+    assert stage.executors[0].spin_some(2 * PATIENCE)
+    assert calls == [1, 1]
+    assert node.context.clock() < end, "it ends a wait"
 
 
 LONG = 1_000_000
