@@ -10,7 +10,7 @@ from muros.rtc.composite import PeriodicECSharedComposite
 from muros.rtc.corba import NameServer, Objects, Orb, RunningNameServer, set_up
 from muros.rtc.corba._conversion import to_nv_list
 from muros.rtc.corba._organization import ForeignMember
-from muros.rtc.corba._stubs import RTC, OpenRTM, SDOPackage
+from muros.rtc.corba._stubs import RTC, OpenRTM, OpenRTM__POA, SDOPackage
 from tests.rtc.corba._world import World
 
 
@@ -134,6 +134,22 @@ def test_editors_change_the_members(world: World, composed: Composed) -> None:
     for missing in (organization.remove_organization_property, organization.get_organization_property_value):
         with pytest.raises(SDOPackage.InvalidParameter):
             missing("a")
+
+
+def test_a_composite_that_shows_foreign_ports_is_observed(orb: Orb, composed: Composed) -> None:
+    class Deaf(OpenRTM__POA.ComponentObserver):  # type: ignore[misc]
+        def update_status(self, status_kind: Any, hint: str) -> None: ...
+
+    servant = Deaf()
+    configuration = composed.reference.get_configuration()
+    try:
+        given = SDOPackage.ServiceProfile(
+            "editor", "IDL:OpenRTM/ComponentObserver:1.0", to_nv_list({}), orb.activate(servant)
+        )
+        assert configuration.add_service_profile(given)
+        assert configuration.remove_service_profile("editor")
+    finally:
+        orb.deactivate(servant)
 
 
 def test_members_are_free_again_when_the_composite_ends(world: World, composed: Composed) -> None:

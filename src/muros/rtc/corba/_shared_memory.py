@@ -2,7 +2,8 @@
 
 Both sides have an OpenRTM::PortSharedMemory object and know each other's. Who sends (push: the OutPort, pull: the
 OutPort, too, when it is asked) owns the block: it makes one under a name of its own, tells the receiver that name
-(`open_memory`), writes the value and signals (push), or answers the signal (pull). A value that does not fit gets a new
+(`open_memory`), writes the value and signals (push), or answers the signal (pull). Once the receiver has opened the
+block its name is taken away, so that nothing stays of processes that are killed. A value that does not fit gets a new
 block. In the block: the count of octets as a CDR unsigned long long in the agreed endianness, then the octets.
 
 The block is a file of the memory file system, read and written with pread and pwrite: as quick as a mapping for whole
@@ -110,12 +111,17 @@ class _Block:
             raise ValueError("the block has been cut short")
         return octets
 
+    def forget_name(self) -> None:
+        """Nobody else needs to find it: it ends with those who have it, however they end."""
+        if self._made:
+            self._made = False
+            with contextlib.suppress(OSError):
+                os.unlink(FOLDER / self.name)
+
     def close(self) -> None:
         """Let go of it; one that was made here ends."""
         os.close(self._file)
-        if self._made:
-            with contextlib.suppress(OSError):
-                os.unlink(FOLDER / self.name)
+        self.forget_name()
 
 
 class _End(OpenRTM__POA.PortSharedMemory):  # type: ignore[misc]
@@ -217,6 +223,7 @@ class _End(OpenRTM__POA.PortSharedMemory):  # type: ignore[misc]
         except CORBA.Exception:
             block.close()
             raise
+        block.forget_name()
         self._replace(block)
         return True
 
