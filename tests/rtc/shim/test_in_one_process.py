@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -10,21 +9,6 @@ import pytest
 import OpenRTM_aist as rtm
 import RTC
 import RTC__POA
-from muros.rtc.corba import Orb
-
-
-@pytest.fixture
-def manager(orb: Orb, monkeypatch: pytest.MonkeyPatch) -> Iterator[rtm.Manager]:
-    """A manager that nobody else sees."""
-    settings = ("naming.enable:NO", "logger.enable:NO", "manager.shutdown_auto:NO", "corba.endpoints:127.0.0.1:",
-                "exec_cxt.periodic.rate:200", "manager.shutdown_on_nortcs:NO")  # fmt: skip
-    manager = rtm.Manager.init(["program", "-i", "-f", "none", *(w for s in settings for w in ("-o", s))])
-    assert manager.activateManager()
-    assert manager.activateManager(), "twice is once"
-    manager.runManager(True)
-    yield manager
-    manager.shutdown()
-    manager.join()
 
 
 def spec(name: str, *more: str) -> rtm.Properties:

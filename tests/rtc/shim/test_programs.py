@@ -96,6 +96,8 @@ def test_state_machines(run: object, stage: Stage) -> None:
     wait_for(lambda: machine.lines.count("locked") >= 2, lambda: str(machine.lines))
     assert seq is not None
     console.type("1")
+    assert machine.end() == 0
+    machine.said("finalized")
 
 
 def test_all_in_a_daemon_by_their_modules(stage: Stage) -> None:

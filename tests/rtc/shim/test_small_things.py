@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import inspect
 import io
+import re
 import sys
+import threading
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,6 +15,7 @@ import pytest
 
 import OpenRTM_aist as rtm
 import RTC
+from OpenRTM_aist._absent import INSTEAD
 from OpenRTM_aist._tools import _imp, help_old_tools
 
 
@@ -231,3 +235,152 @@ def test_stubs_are_one_set() -> None:
 def test_all_names_are_there() -> None:
     missing = [name for name in rtm.__all__ if not hasattr(rtm, name)]
     assert missing == []
+
+
+class TestWhatProgramsAskTheModuleFor:
+    def test_modules_of_the_original(self) -> None:
+        for name in (
+            "CORBA_RTCUtil",
+            "StringUtil",
+            "NVUtil",
+            "Guard",
+            "EventPort",
+            "RTM_IDL",
+            "RTObject",
+            "Async",
+        ):
+            assert importlib.import_module(f"OpenRTM_aist.{name}")
+        assert rtm.StringUtil.normalize(" A ") == "a"
+        assert rtm.RTObject.ECOTHER_OFFSET == 1000
+        assert rtm.Guard.ScopedLock is rtm.ScopedLock
+        assert rtm.EventPort.EventInPort is rtm.EventInPort
+
+    def test_functions_that_the_original_has_at_its_top(self) -> None:
+        for name, module in (("already_connected", rtm.CORBA_RTCUtil), ("Link", rtm.StaticFSM)):
+            assert getattr(rtm, name) is getattr(module, name)
+        assert rtm.uuid1() != rtm.uuid1()
+
+    @pytest.mark.parametrize(
+        ("name", "instead"),
+        [
+            ("InPortConsumerFactory", "register_transport"),
+            ("SerializerFactory", "register_serializer"),
+            ("PeriodicTask", "threading"),
+            ("ExecutionContextBase", "muros.rtc.contexts"),
+            ("Nonsense", "no attribute 'Nonsense'$"),
+        ],
+    )
+    def test_what_is_not_there_says_what_is(self, name: str, instead: str) -> None:
+        with pytest.raises(AttributeError, match=instead):
+            getattr(rtm, name)
+
+    def test_what_is_named_instead_is_there(self) -> None:
+        for words in (words for _, words in INSTEAD):
+            for path in re.findall(r"(?:muros|OpenRTM_aist)\.[\w.]*\w", words):
+                module, _, name = path.rpartition(".")
+                assert hasattr(importlib.import_module(module), name) or importlib.import_module(path)
+
+
+class TestThreads:
+    def test_a_lock_for_as_long_as_a_variable(self) -> None:
+        mutex = threading.Lock()
+
+        def hold() -> bool:
+            guard = rtm.ScopedLock(mutex)
+            return mutex.locked() and guard is not None
+
+        assert hold()
+        assert not mutex.locked()
+        with rtm.ScopedLock(mutex) as guard:
+            assert mutex.locked()
+        assert not mutex.locked()
+        del guard
+        assert not mutex.locked()
+
+    def test_a_task(self) -> None:
+        done = []
+
+        class Work(rtm.Task):
+            def svc(self) -> int:
+                done.append(threading.current_thread().name)
+                return 0
+
+        work = Work()
+        work.wait()
+        work.activate()
+        work.wait(10.0)
+        work.finalize()
+        assert done == ["Work"]
+        other = rtm.Task()
+        other.setTask(done.append, "set")
+        other.activate()
+        other.wait(10.0)
+        assert done == ["Work", "set"]
+
+    def test_a_call_meanwhile(self) -> None:
+        gate, seen = threading.Event(), []
+
+        def slowly(obj: str, word: str) -> None:
+            assert gate.wait(10.0)
+            seen.append((obj, word))
+
+        call = rtm.Async_tInvoker("object", slowly, "word")
+        call.invoke()
+        call.invoke()  # it runs already
+        assert not call.finished()
+        gate.set()
+        call.wait(10.0)
+        assert call.finished()
+        assert seen == [("object", "word")]
+
+    @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+    def test_a_call_that_fails_is_over(self) -> None:
+        call = rtm.Async_tInvoker(None, len)
+        call.invoke()
+        call.wait(10.0)
+        assert call.finished()
+
+
+class TestTextsOfVersion2:
+    def test_values_as_version_2_has_them(self) -> None:
+        assert rtm.stringTo(0, "12") == (True, 12)
+        assert rtm.stringTo(0, "x") == (False, 0)
+        assert rtm.stringTo(False, "1") == (True, True)
+        number = [0.5]
+        assert rtm.stringTo(number, "1.5")
+        assert number == [1.5]
+        assert not rtm.stringTo(number, "x")
+        assert number == [1.5]
+        blank = [" a b "]
+        assert rtm.StringUtil.eraseBlank(blank) == "ab"
+        assert blank == ["ab"]
+
+    def test_the_error_that_is_handled(self) -> None:
+        try:
+            raise ValueError("spilled")
+        except ValueError:
+            assert "ValueError: spilled" in rtm.Logger.print_exception()
+
+
+class TestListsOfNamesAndValues:
+    def test_as_texts(self, capsys: pytest.CaptureFixture[str]) -> None:
+        values = [rtm.NVUtil.newNV("a", "1"), rtm.NVUtil.newNV("b", 2)]
+        assert rtm.NVUtil.toProperties(values).as_dict() == {"a": "1", "b": "2"}
+        assert rtm.NVUtil.isStringValue(values, "a", "1")
+        assert not rtm.NVUtil.isStringValue(values, "a", "2")
+        assert not rtm.NVUtil.isStringValue(values, "b", "2"), "that is a number"
+        more: list[Any] = []
+        rtm.NVUtil.append(more, values)
+        rtm.NVUtil.dump(more)
+        assert capsys.readouterr().out == "a: 1\nb: 2\n"
+
+    def test_sequences(self) -> None:
+        numbers = [1, 2, 3]
+        rtm.CORBA_SeqUtil.insert(numbers, 0, 0)
+        rtm.CORBA_SeqUtil.erase_if(numbers, lambda n: n == 2)
+        rtm.CORBA_SeqUtil.erase_if(numbers, lambda n: n == 9)
+        assert numbers == [0, 1, 3]
+        assert (rtm.CORBA_SeqUtil.front(numbers), rtm.CORBA_SeqUtil.back(numbers)) == (0, 3)
+        seen: list[int] = []
+        rtm.CORBA_SeqUtil.for_each(numbers, seen.append)
+        assert seen == numbers

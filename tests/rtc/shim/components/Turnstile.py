@@ -7,6 +7,7 @@ import sys
 
 import RTC
 import OpenRTM_aist
+import OpenRTM_aist.EventPort as EventPort
 import OpenRTM_aist.StaticFSM as StaticFSM
 
 turnstile_spec = [
@@ -77,10 +78,15 @@ class Unlocked(StaticFSM.Link):
 class Turnstile(OpenRTM_aist.DataFlowComponentBase):
     def onInitialize(self):
         self._fsm = StaticFSM.Machine(Top, self)
-        self._eventIn = OpenRTM_aist.EventInPort("event", self._fsm)
+        self._eventIn = EventPort.EventInPort("event", self._fsm)
         self.addInPort("event", self._eventIn)
         self._eventIn.bindEvent1("coin", Top.coin, RTC.TimedLong(RTC.Time(0, 0), 0))
         self._eventIn.bindEvent0("push", Top.push)
+        return RTC.RTC_OK
+
+    def onFinalize(self):
+        self._fsm.shutdown()
+        print("finalized", flush=True)
         return RTC.RTC_OK
 
     def onExecute(self, ec_id):
