@@ -48,6 +48,39 @@ def test_a_program_runs_from_the_folder(
         agent.stop()
 
 
+def test_a_small_one_runs_its_program_and_says_what_names_were(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    require("unix")
+    require("mpy-cross")
+    program = PROGRAMS / "talker_listener.py"
+    options = ("--mpy", "--small", "--program", str(program))
+    assert copy(tmp_path / "large", "std_msgs/msg/String", "--mpy") == 0
+    assert copy(tmp_path / "small", "std_msgs/msg/String", *options) == 0
+    out = capsys.readouterr().out
+    assert f"mpremote fs cp -r {tmp_path}/small/muros {tmp_path}/small/std_msgs :lib/" in out
+    sizes = [
+        sum(file.stat().st_size for file in (tmp_path / form / "muros" / "client").rglob("*.mpy"))
+        for form in ("small", "large")
+    ]
+    assert sizes[0] < 0.75 * sizes[1]
+    names = dict(line.split() for line in (tmp_path / "small/names.txt").read_text().splitlines())
+    assert "SessionCore" in names.values()
+    assert not {"Session", "spin_some"} & set(names.values())
+    link = UdpLink(0, "127.0.0.1")
+    agent = RunningAgent(link)
+    try:
+        arguments = ["127.0.0.1", str(link.port)]
+        assert run_mpy(program, arguments, library=[tmp_path / "small"]).endswith("done\n")
+    finally:
+        agent.stop()
+
+
+def test_small_needs_the_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert copy(tmp_path, "std_msgs/msg/String", "--mpy", "--small") == 2
+    assert "--program for each file of yours" in capsys.readouterr().err
+
+
 def test_sizes_are_those_of_the_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert copy(tmp_path, "std_msgs/Int32") == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()[:3]]

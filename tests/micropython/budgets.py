@@ -107,8 +107,13 @@ def smallest(
     ``form`` is ``py`` or ``mpy``. A program that does not fit even twice the limit raises BoardError.
     """
     tree = {**board_tree(), **(extra or {}), f"{program}.py": (PROGRAMS / f"{program}.py").read_bytes()}
+    return smallest_of(compiled(tree, march="x64") if form == "mpy" else tree, program, limit, args)
+
+
+def smallest_of(tree: Tree, program: str, limit: int, args: Sequence[str] = ()) -> float:
+    """The same for a module of a tree that is ready for a board."""
     with TemporaryDirectory() as name:
-        folder = write(compiled(tree, march="x64") if form == "mpy" else tree, Path(name))
+        folder = write(tree, Path(name))
 
         def run(heapsize: str) -> None:
             output = run_mpy(f"import {program}", args, heapsize=heapsize, library=[folder])

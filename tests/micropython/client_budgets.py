@@ -9,17 +9,22 @@ import of a program that publishes over serial        12 kB
 bytecode of the core                                  16 kB
 smallest heap on 64 bit, as .mpy and as .py           40, 64 kB
 ====================================================  ==========
+
+Rows that say "small" are of a floor that is made small for its program, see ``muros.cli._small``.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from muros.cli._small import small
 from muros.interfaces import board
 from muros.links import UdpLink
 from tests.client.agent_thread import RunningAgent
 from tests.micropython.budgets import (
+    PROGRAMS,
     Budget,
     drift,
     import_heap,
@@ -27,9 +32,11 @@ from tests.micropython.budgets import (
     live_heap,
     object_heap,
     smallest,
+    smallest_of,
 )
+from tests.micropython.gauge import heap_cost
 from tests.micropython.runtimes import ROOT
-from tests.micropython.tree import Tree, board_tree, compiled
+from tests.micropython.tree import Tree, board_tree, compiled, small_compiled, small_tree
 
 GAUGE = ("mpy-cross", "gauge")
 
@@ -45,6 +52,33 @@ CORE = (
 """What a program keeps that has publishers, subscriptions, services, clients, timers, an executor, and the time."""
 TROUBLED = CORE + ", muros.client.echo, muros.client.backlog, muros.xrce.fragments, muros.xrce.mending"
 """The same while samples come and go in pieces, during a ping, and once a message was lost."""
+
+SMALL_PUBLISHER = """
+from muros.client import Custom, Session
+from muros.rclc import Context
+from std_msgs.msg import Int32
+
+session = Session(Custom(begin, end, put, get, framing=True))
+publisher = Context(session).node("board").publisher(Int32, "number")
+while True:
+    session.spin_once()
+    publisher.publish(Int32(data=1))
+"""
+"""A program of the same kind, for which the floor is made small. What it imports is measured."""
+SMALL_CORE = """
+from muros.client import Session, TimeSync
+from muros.rclc import Context, Executor
+
+context = Context(session)
+node = context.node("board")
+publisher = node.publisher(Number, "number")
+node.subscription(Number, "number", print)
+node.timer(1.0, print)
+node.service(Add, "add", answer)
+node.client(Add, "add")
+TimeSync(session)
+Executor(context).spin()
+"""
 
 WHOLE = """
 compat exports
@@ -120,13 +154,8 @@ def with_tests(measure: Callable[..., float], setup: str, expression: str) -> fl
 
 def running(form: str, limit: int) -> float:
     """kB of the smallest 64-bit heap in which the program talks to itself through the agent over UDP."""
-    link = UdpLink(0, "127.0.0.1")
-    agent = RunningAgent(link)
-    try:
-        arguments = ["127.0.0.1", str(link.port)]
-        return smallest("talker_listener", form, limit, arguments, messages("std_msgs/msg/String"))
-    finally:
-        agent.stop()
+    with _agent() as port:
+        return smallest("talker_listener", form, limit, ["127.0.0.1", port], messages("std_msgs/msg/String"))
 
 
 def heap_of_a_program() -> float:
@@ -146,6 +175,39 @@ def flash() -> float:
     """Bytes of .mpy of the whole core."""
     tree = compiled(board_tree())
     return sum(len(tree[f"muros/{module}.mpy"]) for module in WHOLE.split())
+
+
+def imported_small(program: str, types: Sequence[str] = ()) -> float:
+    """Bytes on a 32-bit heap of what a program imports of a floor that is small for it."""
+    tree = small_compiled(small_tree(messages(*types), [program]))
+    return heap_cost(tree, program.strip().split("\n\n")[0])
+
+
+def running_small(limit: int) -> float:
+    """As ``running``, compiled from a floor that is small for the program."""
+    program = PROGRAMS / "talker_listener.py"
+    tree = small_tree(messages("std_msgs/msg/String"), [program.read_text()], native=True)
+    with _agent() as port:
+        tree[program.name] = program.read_bytes()
+        return smallest_of(small_compiled(tree, "x64"), program.stem, limit, ["127.0.0.1", port])
+
+
+def flash_small() -> float:
+    """Bytes of .mpy of the whole core when it is small."""
+    parts = {f"muros/{module}.py" for module in WHOLE.split()} | {"muros/__init__.py"}
+    tree = {path: content for path, content in board_tree().items() if path in parts}
+    return sum(map(len, small_compiled(small(tree, [SMALL_CORE])[0]).values()))
+
+
+@contextmanager
+def _agent() -> Iterator[str]:
+    """The port of an agent on loopback."""
+    link = UdpLink(0, "127.0.0.1")
+    agent = RunningAgent(link)
+    try:
+        yield str(link.port)
+    finally:
+        agent.stop()
 
 
 def with_agent(extra: Tree) -> Tree:
@@ -173,6 +235,17 @@ CLIENT_BUDGETS: tuple[Budget, ...] = (
         "the same with pieces under way, a ping and losses", 26_000, "B", GAUGE, partial(imported, TROUBLED)
     ),
     Budget("bytecode of the same with what is borrowed", 42_500, "B", ("mpy-cross",), flash),
+    Budget(
+        "import of a program that publishes Int32 over serial, small",
+        12_700,
+        "B",
+        GAUGE,
+        partial(imported_small, SMALL_PUBLISHER, ("std_msgs/msg/Int32",)),
+    ),
+    Budget("import of client and rclc, small", 13_500, "B", GAUGE, partial(imported_small, SMALL_CORE)),
+    Budget(
+        "bytecode of client and rclc with what is borrowed, small", 32_500, "B", ("mpy-cross",), flash_small
+    ),
     Budget(
         "session, MTU 256, history 4, both directions",
         3_200,
@@ -215,6 +288,13 @@ CLIENT_BUDGETS: tuple[Budget, ...] = (
         "kB",
         ("unix", "mpy-cross"),
         partial(running, "mpy", 68),
+    ),
+    Budget(
+        "smallest heap of the same over UDP, small, 64 bit",
+        56,
+        "kB",
+        ("unix", "mpy-cross"),
+        partial(running_small, 56),
     ),
     Budget(
         "smallest heap of the same over UDP, as .py, 64 bit",

@@ -4,7 +4,7 @@ A tree is a mapping from a path as the board sees it (``muros/xrce/serial.py``) 
 """
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from muros.cli import _floor
 from muros.cli._floor import HOST_ONLY as HOST_ONLY
@@ -15,6 +15,7 @@ from muros.cli._floor import board_files as board_files
 from muros.cli._floor import board_path as board_path
 from muros.cli._floor import board_tree as board_tree
 from muros.cli._floor import write as write
+from muros.cli._small import small
 from tests.micropython.runtimes import ROOT, BoardError
 
 _CACHE = ROOT / "build" / "mpy"
@@ -27,16 +28,36 @@ def compiled(tree: Mapping[str, bytes], march: str | None = None) -> Tree:
     return _floor.compiled(tree, march, _compile)
 
 
+def small_compiled(tree: Mapping[str, bytes], march: str | None = None) -> Tree:
+    """A tree that was made small, compiled as ``muros board copy --small`` does it."""
+    return _floor.compiled(tree, march, _compile_small)
+
+
+def small_tree(extra: Mapping[str, bytes], programs: Iterable[str], native: bool = False) -> Tree:
+    """The board floor and more, made small for programs, as sources; with native code or without."""
+    tree = {**board_tree(), **extra}
+    if not native:
+        tree = {path: content for path, content in tree.items() if not _floor.is_native(content)}
+    return small(tree, programs)[0]
+
+
 def _compile(path: str, content: bytes, march: str | None) -> bytes:
-    key = hashlib.sha256(b"\0".join([path.encode(), (march or "").encode(), _COMPILER, content])).hexdigest()[
-        :24
-    ]
+    return _cached(path, content, march, _floor.mpy)
+
+
+def _compile_small(path: str, content: bytes, march: str | None) -> bytes:
+    return _cached(path, content, march, _floor.small_mpy)
+
+
+def _cached(path: str, content: bytes, march: str | None, compile_: _floor.Compile) -> bytes:
+    parts = [compile_.__name__.encode(), path.encode(), (march or "").encode(), _COMPILER, content]
+    key = hashlib.sha256(b"\0".join(parts)).hexdigest()[:24]
     cached = _CACHE / f"{key}.mpy"
     if not cached.exists():
         _CACHE.mkdir(parents=True, exist_ok=True)
         fresh = _CACHE / f"{key}.new"
         try:
-            fresh.write_bytes(_floor.mpy(path, content, march))
+            fresh.write_bytes(compile_(path, content, march))
         except CompileError as error:
             raise BoardError(str(error)) from None
         fresh.replace(cached)

