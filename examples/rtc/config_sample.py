@@ -15,7 +15,7 @@ class ConfigSample(Component):
     version = "1.0"
     category = "example"
     max_instance = 10
-    specification = {"exec_cxt.periodic.rate": "10"}
+    rate = 10
 
     int_param0 = Parameter(0, widget="slider.10", constraint="0<=x<=150")
     int_param1 = Parameter(1, widget="spin", constraint="0<=x<=1000")

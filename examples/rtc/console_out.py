@@ -10,7 +10,7 @@ class ConsoleOut(Component):
     version = "1.0"
     category = "example"
     max_instance = 10
-    specification = {"exec_cxt.periodic.rate": "100"}
+    rate = 100
 
     values = InPort(TimedLong, name="in")
 

@@ -9,7 +9,7 @@ class MyServiceConsumer(Component):
     version = "1.0"
     category = "example"
     max_instance = 10
-    specification = {"exec_cxt.periodic.rate": "1"}
+    rate = 1
 
     service = Required(
         "SimpleService::MyService", idl="MyService.idl", port="MyService", instance="myservice0"

@@ -11,7 +11,8 @@ class SeqIn(Component):
     version = "1.0"
     category = "example"
     max_instance = 10
-    specification = {"implementation_id": "SeqIn", "exec_cxt.periodic.rate": "100"}
+    rate = 100
+    specification = {"implementation_id": "SeqIn"}
 
     octet = InPort(RTC.TimedOctet, name="Octet")
     short = InPort(RTC.TimedShort, name="Short")

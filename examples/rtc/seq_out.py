@@ -13,7 +13,8 @@ class SeqOut(Component):
     version = "1.0"
     category = "example"
     max_instance = 10
-    specification = {"implementation_id": "SeqOut", "exec_cxt.periodic.rate": "10"}
+    rate = 10
+    specification = {"implementation_id": "SeqOut"}
 
     octet = OutPort(RTC.TimedOctet, name="Octet")
     short = OutPort(RTC.TimedShort, name="Short")

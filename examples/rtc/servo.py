@@ -18,7 +18,7 @@ class _Part(Component):
     """What the three have in common."""
 
     category = "example"
-    specification = {"exec_cxt.periodic.rate": f"{RATE:g}"}
+    rate = RATE
 
 
 class Motor(_Part):

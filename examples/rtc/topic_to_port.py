@@ -14,7 +14,7 @@ class TopicToPort(Component):
     """Reads a topic of ROS 2 and writes a port"""
 
     category = "example"
-    specification = {"exec_cxt.periodic.rate": "100"}
+    rate = 100
 
     topic = InPort(TimedDouble)
     out = OutPort(TimedDouble)

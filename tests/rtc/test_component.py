@@ -307,6 +307,21 @@ def test_what_a_class_declares_is_its_specification() -> None:
     }
 
 
+def test_the_rate_and_the_logger_of_a_component(caplog: pytest.LogCaptureFixture) -> None:
+    class Slow(Component):
+        rate = 2.5
+
+        def on_activated(self, context: int) -> None:
+            self.log.warning("slowly")
+
+    assert Slow.spec()["exec_cxt.periodic.rate"] == "2.5"
+    assert "exec_cxt.periodic.rate" not in Component.spec()
+    component = Slow()
+    alive(component)
+    activate(component)
+    assert caplog.record_tuples == [("muros.rtc.Slow0", 30, "slowly")]
+
+
 def test_declared_ports_and_parameters_are_real_on_an_instance() -> None:
     component = Controller()
     alive(component, {"conf.default.gain": "2", "port.inport.dataport.buffer.length": "4"})
@@ -351,6 +366,22 @@ class Colour:
 
 
 Colour.python_class = Colour
+
+
+def test_what_components_have_themselves_is_no_name_for_a_port() -> None:
+    with pytest.raises(
+        RtcError, match=r"Timed\.rate: components have 'rate' themselves; .* give name='rate'"
+    ):
+
+        class Timed(Component):
+            rate = InPort(LONG)  # type: ignore[assignment]
+
+    class Named(Component):
+        rate_in = InPort(LONG, name="rate")
+
+    component = Named()
+    alive(component)
+    assert component.port("rate") is component.rate_in
 
 
 def test_the_wrong_value_is_refused_by_name() -> None:

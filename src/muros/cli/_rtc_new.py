@@ -293,7 +293,8 @@ def _attributes(profile: RtcProfile) -> Iterable[tuple[str, object]]:
     if profile.max_instances:
         yield "max_instance", profile.max_instances
     if profile.execution_rate is not None and profile.execution_rate != 1000.0:
-        yield "specification", {"exec_cxt.periodic.rate": f"{profile.execution_rate:g}"}
+        rate = profile.execution_rate
+        yield "rate", int(rate) if rate.is_integer() else rate
 
 
 def _imports(ports: Iterable[DataPortProfile]) -> list[str]:

@@ -16,6 +16,7 @@ execution contexts start. `exit` takes it back.
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, cast, runtime_checkable
@@ -40,6 +41,8 @@ PARTICIPATING: Final = 1000
 """Handles of contexts that a component takes part in without owning them begin here."""
 
 OK: Final = ReturnCode.RTC_OK
+LOGGER_NAME: Final = "muros.rtc"
+"""The logger above those of managers and components."""
 LANGUAGE: Final = {"language": "Python", "lang_type": "script"}
 
 
@@ -92,6 +95,8 @@ class Component:
     activity_type: ClassVar[str] = "DataFlowComponent"
     max_instance: ClassVar[int] = 0
     """Instances that a manager makes at most; 0: any number."""
+    rate: ClassVar[float] = 0.0
+    """Cycles a second of the context it gets, where rtc.conf does not say otherwise; 0: that of all, 1000."""
     specification: ClassVar[Mapping[str, str]] = {}
 
     # The user's actions
@@ -147,6 +152,12 @@ class Component:
     def __init_subclass__(cls, **arguments: Any) -> None:
         super().__init_subclass__(**arguments)
         join_names(cls)
+        for name, value in vars(cls).items():
+            if _is_declaration(value) and hasattr(Component, name):
+                raise RtcError(
+                    f"{cls.__name__}.{name}: components have {name!r} themselves; call the attribute otherwise, and "
+                    f"give name={name!r}"
+                )
 
     def __init__(self) -> None:
         self.instance_name = ""
@@ -182,6 +193,8 @@ class Component:
             "max_instance": str(cls.max_instance),
             **LANGUAGE,
         }
+        if cls.rate:
+            spec["exec_cxt.periodic.rate"] = f"{cls.rate:g}"
         for declaration in cls.declarations():
             spec.update(declaration.properties())
         return {**spec, **cls.specification}
@@ -192,7 +205,7 @@ class Component:
         found: dict[str, Declaration] = {}
         for base in reversed(cls.__mro__):
             for name, value in vars(base).items():
-                if callable(getattr(type(value), "make", None)) and hasattr(type(value), "properties"):
+                if _is_declaration(value):
                     found[name] = cast(Declaration, value)
                 else:
                     found.pop(name, None)
@@ -228,6 +241,11 @@ class Component:
             tuple(port.profile() for port in self.ports),
             dict(values),
         )
+
+    @property
+    def log(self) -> logging.Logger:
+        """Its logger, whose lines go where rtc.conf says (`logger.*`)."""
+        return logging.getLogger(LOGGER_NAME).getChild(self.instance_name.replace(".", "_"))
 
     # Ports
 
@@ -427,6 +445,10 @@ class Component:
             remedy=f"Set {parameter.name} to a text like {parameter.default!r}.",
             subject=parameter.name,
         )
+
+
+def _is_declaration(value: object) -> bool:
+    return callable(getattr(type(value), "make", None)) and hasattr(type(value), "properties")
 
 
 def _sets(properties: Mapping[str, str]) -> dict[str, dict[str, str]]:

@@ -82,7 +82,7 @@ def test_everything_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) ->
         "    def get_echo_history(self):",
         "    def set_value(self, value, from_):",
         "    def get_value(self, all_):",
-        '    specification = {"exec_cxt.periodic.rate": "50"}',
+        "    rate = 50",
         "    max_instance = 4",
     ):
         assert line in source.splitlines()

@@ -9,7 +9,7 @@ class Giver(Component):
     """Gives numbers."""
 
     category = "test"
-    specification = {"exec_cxt.periodic.rate": "50"}  # noqa: RUF012
+    rate = 50
     out = OutPort(TimedLong)
     step = Parameter(1, constraint="0<=x<=9", widget="spin")
     fails = Parameter(0)
@@ -30,7 +30,7 @@ class Taker(Component):
     """Takes numbers."""
 
     category = "test"
-    specification = {"exec_cxt.periodic.rate": "50"}  # noqa: RUF012
+    rate = 50
     inp = InPort(TimedLong)
 
     def on_execute(self, context: int) -> None:

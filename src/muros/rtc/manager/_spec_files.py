@@ -46,6 +46,11 @@ CLASS_DEFAULTS: Final = {
     "lang_type": "script",
 }
 
+TOOLS_WANT: Final = dict.fromkeys(
+    ("implementation_id", "type_name", "description", "version", "vendor", "category"), ""
+)
+"""What tools look for in every specification (rtmgr ends with an error where one is missing)."""
+
 
 def read_specs_untrusted(path: Path) -> list[dict[str, str]]:
     """The properties of every component in a file; none where it holds none or cannot be read. Raises nothing."""
@@ -62,7 +67,7 @@ def read_specs_untrusted(path: Path) -> list[dict[str, str]]:
     values = _assigned(tree.body)
     if name in values:
         spec = _old_spec(values[name], values)
-        specs += [spec] if spec is not None else _ask(path, name)
+        specs += [{**TOOLS_WANT, **one} for one in ([spec] if spec is not None else _ask(path, name))]
     known = {"Component"}
     for node in tree.body:
         if isinstance(node, ast.ClassDef) and any(_is_component(base, known) for base in node.bases):
