@@ -99,6 +99,10 @@ class Stage:
         """Run a component's file, as `python NAME.py`."""
         return self._start([sys.executable, str(COMPONENTS / f"{name}.py"), *words])
 
+    def script(self, text: str) -> Program:
+        """Run a program's text."""
+        return self._start([sys.executable, "-c", text])
+
     def muros(self, *words: str) -> Program:
         """Run `muros ...`."""
         return self._start([sys.executable, "-m", "muros", *words])

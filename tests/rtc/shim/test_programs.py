@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
 import RTC
@@ -158,6 +161,18 @@ def test_a_program_finds_components_and_works_them(stage: Stage) -> None:
         "all gone RTC_OK",
         "names []",
     ]
+
+
+def test_the_program_of_the_guide(stage: Stage) -> None:
+    guide = Path(__file__).parents[3] / "docs" / "rtc-old-components.md"
+    (text,) = re.findall(r"```python\n(.*?)```", guide.read_text("utf-8"), re.DOTALL)
+    for name in ("ConsoleIn", "ConsoleOut"):
+        stage.python(name)
+        stage.component(f"{name}0")
+    program = stage.script(text.replace("//localhost/", f"//{stage.names}/") + "\nprint(there, state)\n")
+    assert program.over() == 0, program.lines
+    assert program.lines[-1] == "True ACTIVE_STATE"
+    assert CORBA_RTCUtil.get_connector_names(stage.component("ConsoleOut0"), "in") == ["wire"]
 
 
 def test_a_program_without_a_manager_connects(stage: Stage) -> None:
