@@ -70,6 +70,7 @@ def test_listing_runs_nothing(folder: Path) -> None:
         "implementation_id": "OldStyle",
         "type_name": "OldStyle",
         "vendor": "AIST",
+        **dict.fromkeys(("category", "description", "version"), ""),  # tools want them
         "max_instance": "10",
         "conf.default.gain": "1.0",
         "module_file_name": "OldStyle.py",
