@@ -12,12 +12,13 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import ClassVar, Final
 
 from muros.findings import Severity
-from muros.rtc.codes import LifeCycleState, ReturnCode, RtcError
+from muros.rtc.codes import LifeCycleState, PeerLostError, ReturnCode, RtcError
 from muros.rtc.component import Component
 from muros.rtc.configuration import ConfigEvent, ConfigurationSet
 from muros.rtc.contexts import ContextEvent, ContextEventKind, ExecutionContext, MultilayerCompositeEC
 from muros.rtc.organization import LocalMember, Member, Organization, organizations_of
 from muros.rtc.ports import Port
+from muros.rtc.profiles import ComponentProfile
 from muros.rtc.properties import split_list
 
 __all__ = ["PeriodicECSharedComposite"]
@@ -64,6 +65,18 @@ class PeriodicECSharedComposite(Component):
             if name in (port.full_name, f"{self.instance_name}.{port.full_name}"):
                 return port
         return super().port(name)
+
+    def profile(self) -> ComponentProfile:
+        """As tools see it. Who looks finds out that the process of an exported port has gone, with a member in it."""
+        gone = {port for port in self._exported if not port.is_there()}
+        for member in self.organization.members if gone else ():
+            try:
+                lost = not gone.isdisjoint(member.ports())
+            except PeerLostError:
+                lost = True
+            if lost:
+                self.organization.remove_member(member.instance_name)
+        return super().profile()
 
     @property
     def context(self) -> ExecutionContext:

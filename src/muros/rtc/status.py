@@ -131,7 +131,10 @@ class _Watch:
         self._listen(ComponentEvent.ADD_PORT, self._port_added)
         self._listen(ComponentEvent.REMOVE_PORT, self._port_removed)
         for port in self._component.ports:
-            self._watch_port(port)
+            if isinstance(
+                port, Port
+            ):  # a composite shows ports of other processes, too: those tell others themselves
+                self._watch_port(port)
         self._observer.at_close(self._leave_ports)
 
     def _port_added(self, port: Port) -> None:

@@ -339,6 +339,30 @@ def test_ports_meet_in_a_topic(managers: Managers, world: CorbaWorld, first: str
     assert server.list("dataports.port_cxt/weather.topic_cxt") == []
 
 
+def test_a_composite_with_a_member_in_another_process(managers: Managers, world: CorbaWorld) -> None:
+    """Its exported port is there for tools, and goes with the member's process."""
+    (managers.folder / "Talkers.py").write_text(TALKERS)
+    talker = managers.start("-o", "manager.components.precreate:Talker")
+    wait_until(lambda: world.instance_names() == {"Talker0"})
+    prefix = "composite.PeriodicECShared.Both.conf.default"
+    managers.start(
+        *("-o", "manager.components.precreate:PeriodicECSharedComposite?instance_name=Both"),
+        *("-o", f"{prefix}.members:Talker0", "-o", f"{prefix}.exported_ports:Talker0.out"),
+    )
+    wait_until(lambda: world.instance_names() == {"Talker0", "Both"})
+    both = world._component_at("rtcname://*/Both")
+
+    def ports() -> list[str]:
+        return [one.name for one in both.get_component_profile().port_profiles]
+
+    assert ports() == ["Talker0.out"]
+    (context,) = both.get_owned_contexts()
+    assert context.activate_component(both)._v == ReturnCode.RTC_OK
+    talker.kill()
+    wait_until(lambda: ports() == [])
+    assert context.deactivate_component(both)._v == ReturnCode.RTC_OK
+
+
 STUCK = """
 import threading
 from muros.rtc import Component

@@ -84,13 +84,14 @@ class ForeignPort:
     What it does not answer raises PeerLostError, what its ORB refuses RtcError.
     """
 
-    __slots__ = ("_hash", "_late", "_objects", "reference")
+    __slots__ = ("_hash", "_late", "_objects", "_told", "reference")
 
     def __init__(self, reference: Any, objects: Objects) -> None:
         self.reference: Final = reference
         self._objects = objects
         self._hash = objects.orb.hash_of(reference)
         self._late = 0
+        self._told: PortProfile | None = None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, ForeignPort) and is_same(self.reference, other.reference)
@@ -129,14 +130,18 @@ class ForeignPort:
     @property
     def full_name(self) -> str:
         """`<instance>.<port>`"""
-        with peer(str(self)):
-            return str(asked_again(self.reference.get_port_profile).name)
+        return (self._told or self.profile()).name
 
     def profile(self) -> PortProfile:
-        """As its process tells it."""
-        with peer(str(self)):
-            found = asked_again(self.reference.get_port_profile)
-        return PortProfile(
+        """As its process tells it; as it told before, while it does not answer."""
+        try:
+            with peer(str(self)), quick_answer():
+                found = asked_again(self.reference.get_port_profile)
+        except PeerLostError:
+            if self._told is None:
+                raise
+            return replace(self._told, connectors=())
+        self._told = PortProfile(
             found.name,
             self,
             ForeignComponent(found.owner, self._objects) if found.owner is not None else None,
@@ -147,6 +152,7 @@ class ForeignPort:
             tuple(self._objects.connector_behind(one) for one in found.connector_profiles),
             texts_of(found.properties),
         )
+        return self._told
 
     def activate(self) -> None:
         """Its own component does that."""

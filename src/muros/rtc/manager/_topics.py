@@ -66,6 +66,8 @@ class Topics:
     def join(self, component: Component) -> None:
         """Name the ports of a new component that have topics, and connect them with those that are there."""
         for port in component.ports:
+            if not isinstance(port, Port) or port.owner is not component:
+                continue  # a composite shows ports of its members, maybe of other processes: they are not its own
             kind = KINDS[port.port_type]
             contexts = _contexts(port, kind)
             if not contexts:
