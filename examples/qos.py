@@ -1,7 +1,7 @@
 """Quality of service: a map that late listeners get too, and a sensor whose lost samples nobody sends again.
 
-    python qos.py publish dds:
-    python qos.py listen dds:                        # as late as you like
+    python qos.py dds: publish
+    python qos.py dds: listen                        # as late as you like
 
 prints
 
@@ -20,8 +20,8 @@ from std_msgs.msg import Int32
 
 LATCHED = Qos(reliable=True, depth=1, durability="transient_local")
 
-role = sys.argv.pop(1) if len(sys.argv) > 1 else ""
 context = open_context()
+role = sys.argv[2] if len(sys.argv) > 2 else "listen"
 node = context.node("qos_" + role)
 if role == "publish":
     map_publisher = node.publisher(Int32, "map", LATCHED)

@@ -20,8 +20,8 @@ def pair(request: pytest.FixtureRequest, stage: Stage) -> Any:
 
     def start(talker: str, hearer: str, *words: str) -> tuple[Program, Program]:
         place = "dds:" if way == "graph" else stage.agent()
-        heard = stage.start(hearer, *words[1:], place, on=hears)
-        return stage.start(talker, *words[:1], place, on=talks), heard
+        heard = stage.start(hearer, place, *words[1:], on=hears)
+        return stage.start(talker, place, *words[:1], on=talks), heard
 
     return start
 
@@ -74,7 +74,7 @@ def test_quality_of_service(stage: Stage, pair: Any) -> None:
     stage.until(lambda: "map 1" in hearer.lines)
     stage.until(lambda: follow([s for s in hearer.lines if s != "map 1"], r"sensor (\d+)"))
     assert hearer.lines.count("map 1") == 1
-    late = stage.start("qos", "listen", talker.process.args[-1])
+    late = stage.start("qos", talker.process.args[-2])
     stage.until(lambda: "map 1" in late.lines)
     assert talker.lines == ["the map is out"]
 
