@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Final
 
 from OpenRTM_aist import NVUtil
-from OpenRTM_aist._components import codes
+from OpenRTM_aist._codes import codes
 from OpenRTM_aist._manager import Manager
 from OpenRTM_aist._properties import Properties
 

@@ -15,11 +15,12 @@ from typing import Any, ClassVar
 from muros.rtc.actions import ACTIONS, Action, ComponentEvent
 from muros.rtc.codes import ReturnCode
 from muros.rtc.component import Component
-from muros.rtc.configuration import ConfigEvent
+from muros.rtc.configuration import ConfigEvent, ConfigurationSet
 from muros.rtc.manager._logger import LEVELS, LOGGER_NAME
 from muros.rtc.ports import Port
 from OpenRTM_aist._adapter import Adapter
-from OpenRTM_aist._config_admin import ConfigAdmin
+from OpenRTM_aist._codes import codes, to_code
+from OpenRTM_aist._config_admin import ConfigAdmin, to_properties
 from OpenRTM_aist._data_ports import InPort, OutPort
 from OpenRTM_aist._ports import PortBase
 from OpenRTM_aist._properties import Properties
@@ -45,13 +46,6 @@ __all__ = [
     "PreComponentActionListenerType",
     "RTObject_impl",
 ]
-
-
-def codes() -> Any:
-    """The module RTC, imported when the first component runs: return codes are its values."""
-    import RTC
-
-    return RTC
 
 
 class _Behind(Component):
@@ -214,7 +208,7 @@ class ConfigurationParamListener:
 
 
 class ConfigurationSetListener:
-    """Base of listeners: override `__call__(set)`."""
+    """Base of listeners: override `__call__(set)`, which is given `Properties` with the set's name."""
 
     def __call__(self, config_set: Any) -> None: ...
 
@@ -279,6 +273,7 @@ class RTObject_impl:  # noqa: N801
 
     def __init__(self, manager: Any = None, orb: Any = None, poa: Any = None) -> None:
         self._behind = _Behind(self)
+        self._wrapped: dict[tuple[int, Any], Callable[..., Any]] = {}
         self._manager = manager
         self._rtcout = Logger(type(self).__name__)
 
@@ -466,22 +461,22 @@ class RTObject_impl:  # noqa: N801
         return self._behind.context_of(ec_id).rate
 
     def setExecutionRate(self, ec_id: int, rate: float) -> Any:
-        return self._code(self._behind.context_of(ec_id).set_rate(rate))
+        return to_code(self._behind.context_of(ec_id).set_rate(rate))
 
     def isOwnExecutionContext(self, ec_id: int) -> bool:
         return ec_id < len(self._behind.owned_contexts)
 
     def activate(self, ec_id: int = 0) -> Any:
-        return self._code(self._behind.context_of(ec_id).activate_component(self._behind.participation))
+        return to_code(self._behind.context_of(ec_id).activate_component(self._behind.participation))
 
     def deactivate(self, ec_id: int = 0) -> Any:
-        return self._code(self._behind.context_of(ec_id).deactivate_component(self._behind.participation))
+        return to_code(self._behind.context_of(ec_id).deactivate_component(self._behind.participation))
 
     def reset(self, ec_id: int = 0) -> Any:
-        return self._code(self._behind.context_of(ec_id).reset_component(self._behind.participation))
+        return to_code(self._behind.context_of(ec_id).reset_component(self._behind.participation))
 
     def exit(self) -> Any:
-        return self._code(self._behind.exit())
+        return to_code(self._behind.exit())
 
     # Listeners
 
@@ -496,10 +491,17 @@ class RTObject_impl:  # noqa: N801
     def addPostComponentActionListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
     ) -> Callable[..., Any]:
-        return self._behind.listeners.add(PostComponentActionListenerType.event(listener_type), listener)
+        def call(handle: int, code: ReturnCode) -> None:
+            listener(handle, to_code(code))
+
+        self._wrapped[listener_type, listener] = call
+        self._behind.listeners.add(PostComponentActionListenerType.event(listener_type), call)
+        return listener
 
     def removePostComponentActionListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
-        self._behind.listeners.remove(PostComponentActionListenerType.event(listener_type), listener)
+        call = self._wrapped.pop((listener_type, listener), None)
+        if call is not None:
+            self._behind.listeners.remove(PostComponentActionListenerType.event(listener_type), call)
 
     def addPortActionListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
@@ -540,8 +542,11 @@ class RTObject_impl:  # noqa: N801
     def addConfigurationSetListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
     ) -> Callable[..., Any]:
-        event = ConfigurationSetListenerType.event(listener_type)
-        return self._behind.configuration.listeners.add(event, listener)
+        def call(one: ConfigurationSet) -> None:
+            listener(to_properties(one))
+
+        self._behind.configuration.listeners.add(ConfigurationSetListenerType.event(listener_type), call)
+        return listener
 
     def addConfigurationSetNameListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
@@ -571,10 +576,6 @@ class RTObject_impl:  # noqa: N801
 
     def is_alive(self, exec_context: Any) -> bool:
         return bool(self.getObjRef().is_alive(exec_context))
-
-    @staticmethod
-    def _code(code: ReturnCode) -> Any:
-        return codes().ReturnCode_t._item(int(code))
 
 
 DataFlowComponentBase = RTObject_impl

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from muros.rtc.configuration import Configuration, ConfigurationError, ConfigurationSet
 from OpenRTM_aist._properties import Properties
 
-__all__ = ["ConfigAdmin"]
+__all__ = ["ConfigAdmin", "to_properties"]
 
 
 class ConfigAdmin:
@@ -47,12 +47,12 @@ class ConfigAdmin:
                 parameter.take(values[parameter.name])
 
     def getConfigurationSets(self) -> list[Properties]:
-        return [_properties(one) for one in self._configuration.sets()]
+        return [to_properties(one) for one in self._configuration.sets()]
 
     def getConfigurationSet(self, config_id: str) -> Properties:
         """A set; an empty one where there is none."""
         try:
-            return _properties(self._configuration.get(config_id))
+            return to_properties(self._configuration.get(config_id))
         except ConfigurationError:
             return Properties()
 
@@ -82,7 +82,8 @@ class ConfigAdmin:
             return False
 
 
-def _properties(one: ConfigurationSet) -> Properties:
+def to_properties(one: ConfigurationSet) -> Properties:
+    """A set, under its id as its name."""
     made = Properties(key=one.id)
     made._texts.clear()
     for name, text in one.values.items():

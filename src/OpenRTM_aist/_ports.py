@@ -7,6 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from muros.rtc.ports import ConnectEvent, ConnectEventKind, Port
+from muros.rtc.profiles import ConnectorProfile
+from OpenRTM_aist._codes import to_code, to_connector_profile
 from OpenRTM_aist._properties import Properties
 
 __all__ = [
@@ -83,7 +85,7 @@ class PortBase:
         return Properties.of({**self.port.properties, **self.port.configuration})
 
     def getConnectorProfiles(self) -> list[Any]:
-        return list(self.port.connectors)
+        return [_profile(connector) for connector in self.port.connectors]
 
     def getConnectorIds(self) -> list[str]:
         return [connector.connector_id for connector in self.port.connectors]
@@ -92,10 +94,10 @@ class PortBase:
         return [connector.name for connector in self.port.connectors]
 
     def getConnectorProfileById(self, connector_id: str) -> Any:
-        return self.port.connector(connector_id)
+        return next((one for one in self.getConnectorProfiles() if one.connector_id == connector_id), None)
 
     def getConnectorProfileByName(self, name: str) -> Any:
-        return next((one for one in self.port.connectors if one.name == name), None)
+        return next((one for one in self.getConnectorProfiles() if one.name == name), None)
 
     # What others may ask of the port, for those that ask it here
 
@@ -116,7 +118,7 @@ class PortBase:
         return self.getPortRef().disconnect(connector_id)
 
     def disconnect_all(self) -> Any:
-        return self.port.disconnect_all()
+        return to_code(self.port.disconnect_all())
 
     def addPortConnectListener(self, listener_type: int, listener: Callable[..., Any]) -> Callable[..., Any]:
         """Tell `listener(port name, profile)` of a moment of `PortConnectListenerType`."""
@@ -132,8 +134,17 @@ class PortBase:
         self, kind: ConnectEventKind, listener: Callable[..., Any], *, with_code: bool
     ) -> Callable[..., Any]:
         def call(event: ConnectEvent) -> None:
-            arguments = (event.port.name, event.profile, *((event.code,) if with_code else ()))
-            listener(*arguments)
+            code = event.code if with_code else None
+            listener(event.port.name, _profile(event.profile), *(() if code is None else (to_code(code),)))
 
         self.port.connect_listeners.add(kind, call)
         return listener
+
+
+def _profile(profile: ConnectorProfile) -> Any:
+    return to_connector_profile(profile, [_reference(port) for port in profile.ports])
+
+
+def _reference(port: Any) -> Any:
+    """What leads to a port of a connection, of this process or another; None where it is not known."""
+    return PortBase(port).getPortRef() if isinstance(port, Port) else getattr(port, "reference", None)

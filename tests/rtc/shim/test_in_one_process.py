@@ -244,21 +244,31 @@ def test_ports_tell_of_themselves(manager: rtm.Manager) -> None:
     heard: list[Any] = []
     ports.addPortConnectListener(
         rtm.PortConnectListenerType.ON_NOTIFY_CONNECT,
-        lambda name, profile: heard.append((name, profile.name)),
+        lambda name, profile: heard.append((name, profile.name, len(profile.ports), None in profile.ports)),
     )
     ports.addPortConnectRetListener(
         rtm.PortConnectRetListenerType.ON_CONNECTED,
-        lambda name, profile, code: heard.append((name, code.name)),
+        lambda name, profile, code: heard.append(
+            (name, code == RTC.RTC_OK, rtm.NVUtil.toString(profile.properties, "dataport.dataflow_type"))
+        ),
     )
     ports.wire()
-    assert sorted(heard) == [("in", "RTC_OK"), ("in", "wire"), ("out", "RTC_OK"), ("out", "wire")]
+    assert sorted(heard, key=str) == [
+        ("in", "wire", 2, False),
+        ("in", True, "push"),
+        ("out", "wire", 2, False),
+        ("out", True, "push"),
+    ]
     assert (ports.out.getName(), ports.out.name()) == ("out", "out")
     assert ports.out.getPortDataType() == "IDL:RTC/TimedLong:1.0"
     assert ports.out.getPortRef().get_port_profile().name == "Ports0.out"
     assert ports.out.properties().getProperty("port.port_type") == ""
     (connector_id,) = ports.out.getConnectorIds()
     assert ports.out.getConnectorNames() == ["wire"]
-    assert ports.out.getConnectorProfileById(connector_id) is ports.out.getConnectorProfileByName("wire")
+    assert ports.out.getConnectorProfileById(connector_id).name == "wire"
+    assert ports.out.getConnectorProfileByName("wire").connector_id == connector_id
+    assert ports.out.getConnectorProfiles()[0].ports[0]._is_equivalent(ports.out.getPortRef())
+    assert ports.out.getConnectorProfileById("none") is ports.out.getConnectorProfileByName("none") is None
     assert [info.id for info in ports.out.connectors()] == [connector_id]
     ports.out.disconnect_all()
     assert ports.out.getConnectorProfiles() == []
@@ -298,7 +308,7 @@ def test_actions_and_configuration_are_listened_to(manager: rtm.Manager) -> None
                 before.PRE_ON_ACTIVATED, lambda ec: heard.append(("pre", ec))
             )
             self.post = self.addPostComponentActionListener(
-                after.POST_ON_DEACTIVATED, lambda ec, ret: heard.append(("post", ec, int(ret)))
+                after.POST_ON_DEACTIVATED, lambda ec, ret: heard.append(("post", ec, ret == RTC.RTC_OK))
             )
             self.addPortActionListener(rtm.PortActionListenerType.ADD_PORT, lambda p: heard.append(p.name))
             self.addExecutionContextActionListener(
@@ -308,7 +318,7 @@ def test_actions_and_configuration_are_listened_to(manager: rtm.Manager) -> None
                 rtm.ConfigurationSetNameListenerType.ON_ACTIVATE_CONFIG_SET, lambda name: heard.append(name)
             )
             self.addConfigurationSetListener(
-                rtm.ConfigurationSetListenerType.ON_ADD_CONFIG_SET, lambda one: heard.append(one.id)
+                rtm.ConfigurationSetListenerType.ON_ADD_CONFIG_SET, lambda one: heard.append(one.getName())
             )
             self.addPort(rtm.CorbaPort("service"))
             return RTC.RTC_OK
@@ -325,7 +335,7 @@ def test_actions_and_configuration_are_listened_to(manager: rtm.Manager) -> None
     assert listening.gain == [1.5]
     listening.updateParameters("fast")
     assert listening.gain == [3.0]
-    assert heard == ["Listening0.service", ("pre", 0), ("post", 0, 0), "fast"]
+    assert heard == ["Listening0.service", ("pre", 0), ("post", 0, True), "fast"]
     listening.get_configuration().add_configuration_set(_set("slow"))
     assert heard[-1] == "slow"
 
