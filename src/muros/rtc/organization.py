@@ -164,6 +164,13 @@ class Organizations:
             self.joined = tuple(self._ids.values())
         return found
 
+    def leave_those(self, have_gone: Callable[[object], bool]) -> bool:
+        """It is a member no longer of those that have gone; whether there were any. No lock is held meanwhile."""
+        gone = [id_ for id_, one in tuple(self._ids.items()) if have_gone(one)]
+        for id_ in gone:
+            self.leave(id_)
+        return bool(gone)
+
 
 _lock: Final = threading.Lock()
 

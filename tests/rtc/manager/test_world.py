@@ -363,6 +363,26 @@ def test_a_composite_with_a_member_in_another_process(managers: Managers, world:
     assert context.deactivate_component(both)._v == ReturnCode.RTC_OK
 
 
+def test_a_member_outlives_the_process_of_its_composite(managers: Managers, world: CorbaWorld) -> None:
+    """Tools ask it for its contexts and organizations, and would fail at those that have gone; it runs by itself."""
+    (managers.folder / "Talkers.py").write_text(TALKERS)
+    managers.start("-o", "manager.components.precreate:Talker")
+    wait_until(lambda: world.instance_names() == {"Talker0"})
+    composite = managers.start(
+        *("-o", "manager.components.precreate:PeriodicECSharedComposite?instance_name=Both"),
+        *("-o", "composite.PeriodicECShared.Both.conf.default.members:Talker0"),
+    )
+    talker = world._component_at("rtcname://*/Talker0")
+    (own,) = talker.get_owned_contexts()
+    assert (len(talker.get_organizations()), len(talker.get_participating_contexts())) == (1, 1)
+    assert not own.is_running()
+    composite.kill()
+    wait_until(lambda: not talker.get_participating_contexts())
+    assert talker.get_organizations() == []
+    assert own.is_running()
+    assert own.activate_component(talker)._v == ReturnCode.RTC_OK
+
+
 STUCK = """
 import threading
 from muros.rtc import Component

@@ -13,7 +13,9 @@ from muros.rtc.actions import ComponentEvent
 from muros.rtc.codes import ReturnCode, RtcError
 from muros.rtc.corba._configuration import ConfigurationServant
 from muros.rtc.corba._conversion import to_nv_list, to_return_code
+from muros.rtc.corba._foreign import ForeignContext
 from muros.rtc.corba._fsm import FsmServant
+from muros.rtc.corba._lost import is_there
 from muros.rtc.corba._observer import Observers
 from muros.rtc.corba._stubs import RTC, OpenRTM__POA, SDOPackage
 from muros.rtc.fsm import FSM_SERVICE, fsm_service_of
@@ -106,6 +108,7 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
         return [self._objects.context(context) for context in self.component.owned_contexts]
 
     def get_participating_contexts(self) -> list[Any]:
+        self._part_with_the_gone()
         return [self._objects.context(context) for context in self.component.participating_contexts]
 
     def get_context_handle(self, cxt: Any) -> int:
@@ -169,6 +172,7 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
         return [self._objects.organization(one) for one in organizations_of(self.component).owned]
 
     def get_organizations(self) -> list[Any]:
+        self._part_with_the_gone()
         return [
             self._objects.organization(one) if isinstance(one, Organization) else one
             for one in organizations_of(self.component).joined
@@ -210,6 +214,19 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
     def get_status(self, name: str) -> Any:
         raise SDOPackage.InvalidParameter(f"{self.component.instance_name} has no status '{name}'")
 
+    def _part_with_the_gone(self) -> None:
+        """Let go of contexts and organizations whose processes have ended: tools would fail at each of them.
+
+        A member of a composite that has gone runs by itself again.
+        """
+        component = self.component
+        for context in component.participating_contexts:
+            if isinstance(context, ForeignContext) and not context.is_there():
+                component.detach_context(component.handle_of(context))
+        if organizations_of(component).leave_those(_has_gone):
+            for owned in component.owned_contexts:
+                owned.start()
+
     def _fsm_service(self) -> Any | None:
         service = fsm_service_of(self.component)
         if service is None or self._closed:
@@ -217,3 +234,7 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
         if self._fsm is None or self._fsm.service is not service:
             self._fsm = FsmServant(service)
         return self._objects.orb.activate(self._fsm)
+
+
+def _has_gone(organization: object) -> bool:
+    return not isinstance(organization, Organization) and not is_there(organization)

@@ -9,7 +9,7 @@ from omniORB import CORBA
 from muros.rtc.codes import ExecutionKind, LifeCycleState, ReturnCode, RtcError
 from muros.rtc.contexts import ContextProfile, ExecutionContext, Participant
 from muros.rtc.corba._conversion import from_return_code, texts_of
-from muros.rtc.corba._lost import asked_again, peer, quick_answer
+from muros.rtc.corba._lost import asked_again, is_there, peer, quick_answer
 from muros.rtc.corba._naming import is_same
 from muros.rtc.corba._stubs import RTC
 
@@ -152,6 +152,10 @@ class ForeignContext(ExecutionContext):
             )
         except (CORBA.Exception, RtcError, ValueError):
             return ContextProfile(ExecutionKind.OTHER, 0.0, None, (), {})
+
+    def is_there(self) -> bool:
+        """Whether its process says so; one that does not answer in time may be busy."""
+        return is_there(self.reference)
 
     def is_running(self) -> bool:
         return bool(self._asked("is_running", False))

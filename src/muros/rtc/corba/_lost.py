@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import omniORB
 from omniORB import CORBA
 
 from muros.rtc.codes import PeerLostError, RtcError
 
-__all__ = ["LOST", "asked_again", "describe", "is_late", "peer", "quick_answer"]
+__all__ = ["LOST", "asked_again", "describe", "is_late", "is_there", "peer", "quick_answer"]
 
 T = TypeVar("T")
 
@@ -58,6 +58,15 @@ def quick_answer(seconds: float = QUICK_SECONDS) -> Iterator[None]:
 def is_late(error: BaseException) -> bool:
     """Whether a call has ended because there was no answer in time: the other side may be there and busy."""
     return isinstance(error, CORBA.SystemException) and "CallTimed" in omniORB.minorCodeToString(error)
+
+
+def is_there(reference: Any) -> bool:
+    """Whether an object's process says that it exists; one that does not answer in time may be busy."""
+    try:
+        with quick_answer():
+            return not asked_again(reference._non_existent)
+    except CORBA.Exception as error:
+        return is_late(error)
 
 
 def describe(error: BaseException) -> str:
