@@ -102,7 +102,7 @@ def compiled(tree: Mapping[str, bytes], march: str | None = None, compile_: Comp
 
 def is_native(source: bytes) -> bool:
     """Whether a module holds functions for MicroPython's native or viper emitter."""
-    return any(
+    return b"@micropython" in source and any(
         isinstance(decorator, ast.Attribute) and decorator.attr in ("native", "viper")
         for node in ast.walk(ast.parse(source))
         if isinstance(node, ast.FunctionDef)

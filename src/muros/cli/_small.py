@@ -7,7 +7,7 @@ A board keeps every name of its code in memory, about 20 bytes each, and no coll
   ``KeyError``. Such a name costs nothing. One map holds for all modules and for all kinds of names, and two names never
   become one, so whatever referred to the same thing still does, and nothing needs to be known about scopes and types.
 - Modules that the program keeps in memory all the time are joined into the package ``muros`` itself.
-- Constants are put where they are used; docstrings and annotations go.
+- Constants are put where they are used; docstrings, annotations and functions that nothing mentions go.
 
 Kept are: words of the program; names in strings of the floor, as for ``getattr``; names of messages; what firmware
 offers. So a program that says what it uses runs unchanged. What it does not say it cannot find.
@@ -21,7 +21,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 
 from muros.cli._floor import Tree, is_native
-from muros.cli._small_join import BORROWED, HOME, Modules, join, moved
+from muros.cli._small_join import BORROWED, HOME, OF_MESSAGES, Modules, join, moved
 from muros.cli._small_names import COMMON, OFFERED, STATIC
 from muros.cli._small_strip import strip
 
@@ -52,6 +52,7 @@ def small(tree: Tree, programs: Iterable[str]) -> tuple[Tree, dict[str, str]]:
         (floor if name.split(".")[0] == HOME else messages)[name] = ast.parse(content)
     native = {path.removesuffix(".py").replace("/", "."): path for path in rest if path.endswith(".py")}
     floor = {name: strip(node, {*native, *floor}) for name, node in floor.items()}
+    _drop(floor, messages, words)
     modules = join(floor, messages, native, text, words)
     kept = words | OFFERED | _strings([*floor.values(), *messages.values()]) | _own(messages)
     for name, path in native.items():
@@ -67,6 +68,28 @@ def small(tree: Tree, programs: Iterable[str]) -> tuple[Tree, dict[str, str]]:
         path = name.replace(".", "/") + (_PACKAGE if name in packages else ".py")
         out[path] = ast.unparse(node).encode()
     return out, {new: old for old, new in sorted(names.items())}
+
+
+def _drop(modules: Modules, messages: Modules, words: Collection[str]) -> None:
+    """Takes out what reads and writes messages and what is defined, where nothing that is left mentions it."""
+    for name in reversed(OF_MESSAGES):
+        others = [tree for other, tree in (modules | messages).items() if other != name]
+        imported = {
+            node.module for tree in others for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
+        }
+        if name in modules and name not in imported:
+            del modules[name]
+    mentioned = Counter(words) + Counter(_strings([*modules.values(), *messages.values()]))
+    for tree in (*modules.values(), *messages.values()):
+        mentioned.update(name for node in ast.walk(tree) for name in _names_of(node))
+    for tree in modules.values():
+        tree.body = [
+            node
+            for node in tree.body
+            if not isinstance(node, ast.FunctionDef | ast.ClassDef)
+            or mentioned[node.name] > 1
+            or node.name.startswith("__")
+        ]
 
 
 def _share_arguments(trees: Collection[ast.Module], kept: Collection[str], shared: list[str]) -> None:
