@@ -454,8 +454,9 @@ class RTObject_impl:  # noqa: N801
     # Contexts
 
     def getExecutionContext(self, ec_id: int = 0) -> Any:
-        """The context of a handle, which the component may ask for its rate."""
-        return self._behind.context_of(ec_id)
+        """The reference to the context of a handle; None before others know the component."""
+        reference = self.getObjRef()
+        return None if reference is None else reference.get_context(ec_id)
 
     def getExecutionRate(self, ec_id: int = 0) -> float:
         return self._behind.context_of(ec_id).rate

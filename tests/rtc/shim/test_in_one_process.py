@@ -9,6 +9,7 @@ import pytest
 import OpenRTM_aist as rtm
 import RTC
 import RTC__POA
+from tests.rtc.shim.stage import COMPONENTS
 
 
 def spec(name: str, *more: str) -> rtm.Properties:
@@ -87,7 +88,7 @@ def test_a_component_is_activated_and_ended(manager: rtm.Manager) -> None:
     assert plain.reset(0) == RTC.PRECONDITION_NOT_MET
     assert plain.setExecutionRate(0, 50.0) == RTC.RTC_OK
     assert plain.getExecutionRate(0) == 50.0
-    assert plain.getExecutionContext(0).rate == 50.0
+    assert plain.getExecutionContext(0).get_rate() == 50.0
     assert plain.isOwnExecutionContext(0)
     assert not plain.isOwnExecutionContext(1000)
     manager.deleteComponent("Plain0")
@@ -124,6 +125,27 @@ def test_what_cannot_be_made_is_none_and_told(manager: rtm.Manager) -> None:
     assert any("object, which is no component" in why for why in told)
     assert any("on_initialize answered RTC_ERROR" in why for why in told)
     assert manager.load("no_such_file.py") == RTC.RTC_ERROR
+
+
+def test_modules_are_loaded_and_forgotten(manager: rtm.Manager) -> None:
+    assert manager.load(str(COMPONENTS / "ConsoleOut.py")) == RTC.RTC_OK
+    (loaded,) = manager.getLoadedModules()
+    assert loaded.getProperty("file_path") == str(COMPONENTS / "ConsoleOut.py")
+    component = manager.createComponent("ConsoleOut")
+    assert component.getExecutionContext(0).is_running()
+    manager.unloadAll()
+    assert manager.getLoadedModules() == []
+
+
+def test_before_others_know_a_component(manager: rtm.Manager) -> None:
+    class Asking(rtm.DataFlowComponentBase):
+        def onInitialize(self) -> Any:  # noqa: N802
+            self.seen = (self.getObjRef(), self.getExecutionContext(0), self._this())
+            return RTC.RTC_OK
+
+    asking = make(manager, Asking)
+    assert asking.seen == (None, None, None)
+    assert asking._this()._is_equivalent(asking.getObjRef())
 
 
 def test_values_go_through_ports(manager: rtm.Manager) -> None:
