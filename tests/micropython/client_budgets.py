@@ -237,14 +237,14 @@ CLIENT_BUDGETS: tuple[Budget, ...] = (
     Budget("bytecode of the same with what is borrowed", 42_500, "B", ("mpy-cross",), flash),
     Budget(
         "import of a program that publishes Int32 over serial, small",
-        12_700,
+        12_200,
         "B",
         GAUGE,
         partial(imported_small, SMALL_PUBLISHER, ("std_msgs/msg/Int32",)),
     ),
-    Budget("import of client and rclc, small", 13_500, "B", GAUGE, partial(imported_small, SMALL_CORE)),
+    Budget("import of client and rclc, small", 13_200, "B", GAUGE, partial(imported_small, SMALL_CORE)),
     Budget(
-        "bytecode of client and rclc with what is borrowed, small", 32_500, "B", ("mpy-cross",), flash_small
+        "bytecode of client and rclc with what is borrowed, small", 31_500, "B", ("mpy-cross",), flash_small
     ),
     Budget(
         "session, MTU 256, history 4, both directions",
@@ -291,10 +291,10 @@ CLIENT_BUDGETS: tuple[Budget, ...] = (
     ),
     Budget(
         "smallest heap of the same over UDP, small, 64 bit",
-        56,
+        54,
         "kB",
         ("unix", "mpy-cross"),
-        partial(running_small, 56),
+        partial(running_small, 54),
     ),
     Budget(
         "smallest heap of the same over UDP, as .py, 64 bit",

@@ -83,13 +83,21 @@ def _drop(modules: Modules, messages: Modules, words: Collection[str]) -> None:
     for tree in (*modules.values(), *messages.values()):
         mentioned.update(name for node in ast.walk(tree) for name in _names_of(node))
     for tree in modules.values():
-        tree.body = [
-            node
-            for node in tree.body
-            if not isinstance(node, ast.FunctionDef | ast.ClassDef)
-            or mentioned[node.name] > 1
-            or node.name.startswith("__")
-        ]
+        tree.body = [node for node in tree.body if mentioned[_defines(node)] != 1]
+        for node in tree.body:
+            if isinstance(node, ast.ImportFrom):
+                node.names = [one for one in node.names if one.asname or mentioned[one.name] != 1]
+        tree.body = [node for node in tree.body if not isinstance(node, ast.ImportFrom) or node.names]
+
+
+def _defines(node: ast.stmt) -> str:
+    """The one name that a statement defines and that is all it does; nothing if it does more."""
+    match node:
+        case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+            return "" if name.startswith("__") else name
+        case ast.Assign(targets=[ast.Name(id=name)], value=ast.Constant() | ast.Compare()):
+            return "" if name.startswith("__") else name
+    return ""
 
 
 def _share_arguments(trees: Collection[ast.Module], kept: Collection[str], shared: list[str]) -> None:

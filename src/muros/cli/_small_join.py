@@ -77,7 +77,8 @@ def join(
     for package in _PACKAGES:
         shown = _public(modules, package, members)
         if shown:
-            out[f"muros.{package}"].body.insert(0, _import(shown))
+            body = out[f"muros.{package}"].body
+            out[f"muros.{package}"].body = _together([_import(shown), *body])
     for member in members:
         if member in named:
             handed = sorted(had[member] & set(words))
