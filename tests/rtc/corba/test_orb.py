@@ -187,6 +187,41 @@ def test_an_orb_is_ended_by_what_it_serves_and_started_again() -> None:
     assert second.startswith("no ORB runs")
 
 
+_SHARED = """
+from omniORB import CORBA
+from muros.rtc.corba import start_orb
+from muros.rtc.corba._stubs import OpenRTM__POA
+
+class Target(OpenRTM__POA.InPortCdr):
+    pass
+
+for way in ("destroy", "shutdown"):
+    orb = start_orb("127.0.0.1:")
+    target = Target()
+    orb.activate(target)
+    shared = CORBA.ORB_init([], CORBA.ORB_ID)
+    if way == "shutdown":
+        shared.shutdown(True)
+    shared.destroy()
+    orb.deactivate(target)
+    orb.shutdown()
+    orb.shutdown()
+print("ended")
+"""
+
+
+def test_an_orb_that_others_have_destroyed_is_ended() -> None:
+    """Tools that run components in the process of their own ORB (rtlog, rtinject) end it before the manager does."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", _SHARED],
+        capture_output=True,
+        text=True,
+        timeout=30,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "ended\n", "")
+
+
 def _address(orb: Orb, reference: object) -> str:
     """HOST:PORT of the ORB's first endpoint, from a reference's octets."""
     octets = bytes.fromhex(orb.to_text(reference)[4:])

@@ -11,6 +11,7 @@ Calls to other processes end after `call_timeout` and connecting after `connect_
 from __future__ import annotations
 
 import atexit
+import contextlib
 import os
 import threading
 from collections.abc import Iterable, Sequence
@@ -197,13 +198,15 @@ class Orb:
         with self._ending:
             if self._destroyed:
                 return
-            try:
-                self._orb.destroy()
-            except CORBA.BAD_INV_ORDER:  # a call is being served by this very thread
-                if not self._begun:
-                    self._begun = True
-                    self._orb.shutdown(False)
-                return
+            # OBJECT_NOT_EXIST: another part of the process, which shares the ORB, has destroyed it.
+            with contextlib.suppress(CORBA.OBJECT_NOT_EXIST):
+                try:
+                    self._orb.destroy()
+                except CORBA.BAD_INV_ORDER:  # a call is being served by this very thread
+                    if not self._begun:
+                        self._begun = True
+                        self._orb.shutdown(False)
+                    return
             self._destroyed = True
         self._adapter.close()
         wait_until_gone(THREADS_SECONDS)
