@@ -17,6 +17,7 @@ from tests.client.agent_thread import RunningAgent
 from tests.client.world import World
 from tests.rclc.test_rclc import Board, two
 
+from example_interfaces.action import Fibonacci
 from example_interfaces.srv import AddTwoInts
 from std_msgs.msg import Int32, String
 
@@ -119,6 +120,24 @@ CASES: list[tuple[Callable[[Any], object], type[Exception], int, str]] = [
         TypeError,
         11,
         "the callback of a change is a function, not 5",
+    ),
+    (
+        lambda n: n.action_client(Fibonacci, "f").cancel(FIVE),
+        TypeError,
+        11,
+        "a goal is 16 bytes, as of goal.id, not 5",
+    ),
+    (
+        lambda n: n.action_client(Fibonacci, "f").cancel(stamp=FIVE),
+        TypeError,
+        11,
+        "stamp is (seconds, nanoseconds)",
+    ),
+    (
+        lambda n: n.action_client(Fibonacci, "f").cancel(on_answer=FIVE),
+        TypeError,
+        11,
+        "on_answer is a function",
     ),
     (lambda n: n.parameters().get(FIVE), TypeError, 11, "the name of a parameter is a str, not 5"),
     (lambda n: n.parameters().set(FIVE, 1), TypeError, 11, "the name of a parameter is a str, not 5"),

@@ -81,6 +81,25 @@ class ActionClient(client_.ActionClient):
                 be_callable(callback, name)
         return super().send_goal(goal, on_response, on_feedback, on_result, timeout, result_timeout)
 
+    def cancel(
+        self,
+        identity: bytes | None = None,
+        stamp: tuple[int, int] | None = None,
+        on_answer: Callback = None,
+        timeout: float = client_._TIMEOUT,
+    ) -> bool:
+        """Asks the server to cancel goals; see ``muros.rclc.action_client.ActionClient.cancel``.
+
+        Raises TypeError for what is no id or no stamp.
+        """
+        if identity is not None and not (isinstance(identity, bytes) and len(identity) == 16):
+            raise WrongTypeError(f"the id of a goal is 16 bytes, as of goal.id, not {identity!r}")
+        if stamp is not None and not (isinstance(stamp, tuple) and [type(n) for n in stamp] == [int, int]):
+            raise WrongTypeError(f"stamp is (seconds, nanoseconds), as of goal.stamp, not {stamp!r}")
+        if on_answer is not None:
+            be_callable(on_answer, "on_answer")
+        return super().cancel(identity, stamp, on_answer, timeout)
+
     def call(
         self, goal: Any, timeout: float = client_._CALL, on_feedback: Callback = None
     ) -> client_.SentGoal | None:
