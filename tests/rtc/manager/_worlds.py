@@ -99,7 +99,7 @@ class FakeManager:
 
     def __init__(self, name: str = "other", *, makes: bool = True) -> None:
         self._name = name
-        self._makes = makes
+        self.makes = makes
         self.gone = False
         self.made: list[str] = []
         self.names: set[str] = set()
@@ -128,7 +128,7 @@ class FakeManager:
 
     def create_component(self, request: str) -> object | None:
         self._answer()
-        if not self._makes:
+        if not self.makes:
             return None
         self.made.append(request)
         return ("made", request)

@@ -6,6 +6,7 @@ import pytest
 
 from muros.rtc.codes import ReturnCode, RtcError
 from muros.rtc.component import Component
+from muros.rtc.manager._colleagues import Colleagues
 from tests.rtc.manager._worlds import FakeManager, MemoryWorld, manager_in
 
 
@@ -51,8 +52,31 @@ def test_a_master_lets_its_slaves_work(tmp_path: Path) -> None:
         assert master.delete_component("F") is ReturnCode.BAD_PARAMETER
         assert master.colleagues.remove_slave(slave) is ReturnCode.RTC_OK
         assert master.colleagues.remove_slave(slave) is ReturnCode.BAD_PARAMETER
-        with pytest.raises(RtcError, match="none of the 1 slave managers could make Foo; see their logs"):
-            master.create("Foo")
+
+
+def test_a_slave_is_started_where_those_that_came_by_themselves_cannot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every program with components reports to the master, and most have no module but their own."""
+    program, started = FakeManager("program", makes=False), FakeManager("started")
+    starts: list[str] = []
+
+    def start(colleagues: Colleagues, name: str, language: str) -> FakeManager:
+        starts.append(language)
+        colleagues.add_slave(started)
+        return started
+
+    monkeypatch.setattr(Colleagues, "start", start)
+    with manager_in(tmp_path, manager__is_master="YES") as master:
+        master.start()
+        master.colleagues.add_slave(program)
+        assert master.create("Foo") == master.create("Foo") == ("made", "Foo")
+        started.makes = False
+        with pytest.raises(RtcError, match="none of the 2 slave managers could make Bar; see their logs"):
+            master.create("Bar")
+        assert starts == ["Python"]
+        with pytest.raises(RtcError, match="none of the 1 slave managers could make Bar; see their logs"):
+            master.create("Bar?manager_name=program")
 
 
 def test_a_slave_asks_its_master_for_another_slave(tmp_path: Path) -> None:

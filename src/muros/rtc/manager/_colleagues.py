@@ -49,6 +49,7 @@ class Colleagues:
         self._masters: list[RemoteManager] = []
         self._slaves: list[RemoteManager] = []
         self._started: list[subprocess.Popen[bytes]] = []
+        self._own_slaves: set[RemoteManager] = set()
         self._changed = threading.Condition()
         self._closed = False
 
@@ -135,7 +136,8 @@ class Colleagues:
     def create(self, request: str, *, name: str = "", language: str = "Python") -> Reference:
         """Let a slave make a component: the one called `name`, else any that can. One is started if need be.
 
-        RtcError where none could.
+        Slaves that came by themselves (any program with components does) may lack its module, or have enough to do:
+        one that is started here counts. RtcError where none could.
         """
         fitting = [
             slave
@@ -148,9 +150,11 @@ class Colleagues:
             made: Reference | None = self.ask(slave, lambda one: one.create_component(request), None)
             if made is not None:
                 return made
-        if fitting:
+        if fitting and (name or not self._own_slaves.isdisjoint(fitting)):
             raise RtcError(f"none of the {len(fitting)} slave managers could make {request}; see their logs")
-        made = self.start(name, language).create_component(request)
+        slave = self.start(name, language)
+        self._own_slaves.add(slave)
+        made = slave.create_component(request)
         if made is None:
             raise RtcError(f"the slave manager could not make {request}; see its log")
         return made
