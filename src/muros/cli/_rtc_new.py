@@ -49,7 +49,10 @@ def wishes_of(arguments: argparse.Namespace) -> Wishes:
             profile = replace(profile, name=arguments.name)
         folder = Path(arguments.profile).parent
         named = dict.fromkeys(
-            interface.idl_file for port in profile.service_ports for interface in port.interfaces
+            [
+                *(interface.idl_file for port in profile.service_ports for interface in port.interfaces),
+                *(port.idl_file for port in profile.data_ports if not port.type.startswith("RTC::")),
+            ]
         )
         files = [folder / name for name in named if name and (folder / name).is_file()]
         return Wishes(_checked(replace(profile, language="Python")), with_included(files))

@@ -224,3 +224,13 @@ def test_operations_are_inherited_and_included_files_come_along(folder: Path) ->
         timeout=50,
     )
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_data_types_of_a_users_own_come_along_with_the_profile(folder: Path) -> None:
+    (folder / "Mine.idl").write_text(
+        '#include "BasicDataType.idl"\nmodule Mine { struct Item { RTC::Time tm; long data; }; };'
+    )
+    assert main(["rtc", "new", "Taker", "--inport", "item:Mine::Item", "--idl", "Mine.idl"]) == 0
+    assert main(["rtc", "new", "--profile", "Taker/RTC.xml", "--folder", "again"]) == 0
+    assert (folder / "again/Mine.idl").read_text() == (folder / "Mine.idl").read_text()
+    assert (folder / "again/Taker.py").read_text() == (folder / "Taker/Taker.py").read_text()
