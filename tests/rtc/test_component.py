@@ -434,3 +434,19 @@ def test_all_ports_are_read_before_and_written_after_where_asked() -> None:
     source.write(long(5))
     tick(component)
     assert sink.read().data == 5
+
+
+def test_contexts_of_others_are_not_taken_part_in_without_end() -> None:
+    component = Component()
+    component.initialize([])
+    context = SynchronousExecutionContext()
+    handles = [component.attach_context(context) for _ in range(100)]
+    assert handles == list(range(1000, 1100))
+    with pytest.raises(RtcError, match="takes part in 100 execution contexts already"):
+        component.attach_context(context)
+    assert component.detach_context(1003) is OK
+    assert component.attach_context(context) == 1003
+    for handle in handles:
+        component.detach_context(handle)
+    component.exit()
+    context.close()

@@ -40,6 +40,9 @@ __all__ = ["PARTICIPATING", "Component", "Declaration"]
 PARTICIPATING: Final = 1000
 """Handles of contexts that a component takes part in without owning them begin here."""
 
+PARTICIPATING_LIMIT: Final = 100
+"""Such contexts of one component at most."""
+
 OK: Final = ReturnCode.RTC_OK
 LOGGER_NAME: Final = "muros.rtc"
 """The logger above those of managers and components."""
@@ -405,8 +408,15 @@ class Component:
         return self.context_of(context).get_component_state(self.participation)
 
     def attach_context(self, context: ExecutionContext) -> int:
-        """Take part in `context`, which calls from now on; the handle it is to call with."""
+        """Take part in `context`, which calls from now on; the handle it is to call with.
+
+        RtcError for one context more than PARTICIPATING_LIMIT: each that is forgotten stays until it is detached.
+        """
         with self._lock:
+            if len(self._participating) >= PARTICIPATING_LIMIT:
+                raise RtcError(
+                    f"{self.instance_name} takes part in {PARTICIPATING_LIMIT} execution contexts already"
+                )
             handle = next(
                 h
                 for h in range(PARTICIPATING, PARTICIPATING + len(self._participating) + 1)
