@@ -4,9 +4,20 @@
 from __future__ import annotations
 
 import contextlib
-from typing import Any
+from collections import deque
+from collections.abc import Iterator
+from typing import Any, Final
 
-__all__ = ["CorbaNaming"]
+__all__ = ["CorbaNaming", "bindings"]
+
+CONTEXTS: Final = 1000
+"""Contexts of one server that are looked through; they may be bound in a circle."""
+
+BATCH: Final = 200
+"""Bindings that are asked for at once."""
+
+BINDINGS: Final = 100_000
+"""Bindings that are looked at of one context."""
 
 
 class CorbaNaming:
@@ -90,15 +101,31 @@ class CorbaNaming:
         """What is bound in a context with names of this kind, as `CosNaming.Binding`s; nothing where it is none."""
         import CosNaming
 
-        from muros.rtc.corba._naming import LIST_LIMIT
-
         with contextlib.suppress(CosNaming.NamingContext.NotFound):
             context = self.resolve(string_name)._narrow(CosNaming.NamingContext)
-            found, more = context.list(LIST_LIMIT) if context is not None else ([], None)
-            if more is not None:
-                more.destroy()
+            found = () if context is None else bindings(context)
             return [one for one in found if one.binding_name[-1].kind == string_kind]
         return []
+
+    def find(self, id_: str, kind: str) -> Iterator[Any]:
+        """The objects of this name in any context, nearest first. What does not answer on the way is left out."""
+        import CosNaming
+        from omniORB import CORBA
+
+        seen, waiting = [self._context], deque([self._context])
+        while waiting:
+            context = waiting.popleft()
+            with contextlib.suppress(CORBA.Exception):
+                for one in bindings(context):
+                    name = one.binding_name[-1]
+                    if one.binding_type == CosNaming.ncontext:
+                        inner = context.resolve([name])._narrow(CosNaming.NamingContext)
+                        known = inner is None or any(inner._is_equivalent(other) for other in seen)
+                        if not known and len(seen) < CONTEXTS:
+                            seen.append(inner)
+                            waiting.append(inner)
+                    elif (name.id, name.kind) == (id_, kind):
+                        yield context.resolve([name])
 
     # Names
 
@@ -125,3 +152,18 @@ class CorbaNaming:
             with contextlib.suppress(CosNaming.NamingContext.AlreadyBound):
                 self._context.bind_new_context(parts[:depth])
         return parts
+
+
+def bindings(context: Any) -> list[Any]:
+    """What is bound in a context, as `CosNaming.Binding`s."""
+    found, more = context.list(BATCH)
+    try:
+        while more is not None and len(found) < BINDINGS:
+            again, some = more.next_n(BATCH)
+            found += some
+            if not again:
+                break
+    finally:
+        if more is not None:
+            more.destroy()
+    return list(found)

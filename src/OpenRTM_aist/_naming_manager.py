@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import contextlib
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from muros.rtc.codes import RtcError
+from OpenRTM_aist._corba_naming import CorbaNaming
 
 if TYPE_CHECKING:
-    from muros.rtc.corba import NameServer
     from muros.rtc.manager import Manager as Core
 
 __all__ = ["NamingManager"]
@@ -31,20 +32,23 @@ class NamingManager:
         `robot.host_cxt/Motor0`; `*/Motor0`: in whatever context. `rtcloc://HOST:PORT/CATEGORY/NAME`: a manager.
         Nothing where there is no such component, no such server, or the address is another's.
         """
+        from omniORB import CORBA
+
+        from muros.rtc.corba._lost import asked_again
+
         world = self._core.world
         kind, _, rest = name.partition("://")
         place, _, path = rest.partition("/")
         if not path:
             return []
         found: list[Any] = []
-        try:
-            if kind == "rtcloc":
+        if kind == "rtcloc":
+            with contextlib.suppress(RtcError):
                 found += world.manager_at(place).components_by_name(path)
-            elif kind == "rtcname":
-                for server in self._servers(place):
-                    found += _named(server, path)
-        except RtcError:
-            pass
+        elif kind == "rtcname":
+            for server in self._core.settings.words("corba.nameservers") if place == "*" else [place]:
+                with contextlib.suppress(CORBA.Exception, RtcError):
+                    found += asked_again(partial(_named, server, path))
         return [component for one in found if (component := _component(one)) is not None]
 
     def bindObject(self, name: str, rtobj: Any) -> None:
@@ -58,30 +62,22 @@ class NamingManager:
         """Give name servers the names that they lack."""
         self._core.world.update_names()
 
-    def _servers(self, place: str) -> Iterator[NameServer]:
-        from muros.rtc.corba import NameServer, current_orb
 
-        addresses = self._core.settings.words("corba.nameservers") if place == "*" else [place]
-        for address in addresses:
-            yield NameServer(current_orb(), address)
+def _named(server: str, path: str) -> list[Any]:
+    """What a name server has under a name. CORBA's exceptions if it does not answer, RtcError for what is no name."""
+    import CosNaming
+    from omniORB import CORBA
 
-
-def _named(server: NameServer, path: str) -> list[Any]:
+    from muros.rtc.corba import server_address
     from muros.rtc.corba._lost import quick_answer
 
-    try:
-        with quick_answer():
-            plain = path.removeprefix(ANYWHERE)
-            exact = path if path.endswith(".rtc") else f"{path}.rtc"
-            if plain == path and (reference := server.resolve(exact)) is not None:
-                return [reference]
-            if "/" in plain:
-                return []
-            wanted = plain.removesuffix(".rtc"), "rtc"
-            paths = [place for place, one in server.walk() if (one.name, one.kind) == wanted]
-            return [reference for place in paths if (reference := server.resolve(place)) is not None]
-    except RtcError:
-        return []
+    plain = path.removeprefix(ANYWHERE).removesuffix(".rtc")
+    with quick_answer():
+        names = CorbaNaming(CORBA.ORB_init([], CORBA.ORB_ID), server_address(server))
+        if not path.startswith(ANYWHERE):
+            with contextlib.suppress(CosNaming.NamingContext.NotFound):
+                return [names.resolve(f"{plain}.rtc")]
+        return [] if "/" in plain else list(names.find(plain, "rtc"))
 
 
 def _component(reference: Any) -> Any:

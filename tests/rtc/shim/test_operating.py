@@ -48,6 +48,29 @@ class TestAddresses:
         for name in ("Plain0", "Port0"):
             assert manager.getNaming().string_to_component(f"rtcname://{name_server.address}/{name}") == []
 
+    def test_in_contexts_that_go_in_a_circle(
+        self, manager: rtm.Manager, name_server: RunningNameServer
+    ) -> None:
+        plain = make(manager, Plain)
+        names = rtm.CorbaNaming(manager.getORB(), name_server.address)
+        inner = names.bindNewContext("a.host_cxt/b.cxt")
+        names.bindContext("a.host_cxt/b.cxt/back.cxt", names.getRootContext())
+        names.bindContext("self.cxt", inner)
+        names.bind("a.host_cxt/b.cxt/Plain0.rtc", plain.getObjRef())
+        (found,) = manager.getNaming().string_to_component(f"rtcname://{name_server.address}/*/Plain0")
+        assert found._is_equivalent(plain.getObjRef())
+        assert manager.getNaming().string_to_component(f"rtcname://{name_server.address}/*/Plain1") == []
+
+    def test_among_many(self, manager: rtm.Manager, name_server: RunningNameServer) -> None:
+        plain = make(manager, Plain)
+        names = rtm.CorbaNaming(manager.getORB(), name_server.address)
+        for number in range(450):
+            names.bind(f"many.host_cxt/Plain{number}.rtc", plain.getObjRef(), number == 0)
+        assert len(names.listByKind("many.host_cxt", "rtc")) == 450
+        assert (
+            len(manager.getNaming().string_to_component(f"rtcname://{name_server.address}/*/Plain449")) == 1
+        )
+
     def test_where_nobody_is(self, manager: rtm.Manager) -> None:
         naming, nobody = manager.getNaming(), f"127.0.0.1:{find_free_port()}"
         for address in (
