@@ -450,3 +450,21 @@ def test_contexts_of_others_are_not_taken_part_in_without_end() -> None:
         component.detach_context(handle)
     component.exit()
     context.close()
+
+
+def test_what_a_context_that_has_gone_activated_is_deactivated() -> None:
+    component = Traced()
+    component.initialize([])
+    context = SynchronousExecutionContext()
+    me = component.participation
+    first, second, idle = (component.attach_context(context) for _ in range(3))
+    for handle in (first, second):
+        assert me.on_activated(handle) is OK
+    me.on_deactivated(second)
+    component.trace.clear()
+    for handle in (first, second, idle):
+        me.part(handle)
+    assert component.trace == [f"on_deactivated {first}"]
+    assert component.participating_contexts == ()
+    component.exit()
+    context.close()

@@ -26,6 +26,7 @@ class Participation:
 
     def __init__(self, component: Component) -> None:
         self.component: Final = component
+        self._active: set[int] = set()
 
     def __repr__(self) -> str:
         return f"<{self.component.instance_name}>"
@@ -45,6 +46,12 @@ class Participation:
         """It takes part no longer. BAD_PARAMETER for a handle that was not given."""
         return self.component.detach_context(handle)
 
+    def part(self, handle: int) -> None:
+        """The context of `handle` has gone without a word: what it activated is deactivated here."""
+        if handle in self._active:
+            self.on_deactivated(handle)
+        self.detach_context(handle)
+
     # Actions that contexts call
 
     def on_startup(self, handle: int) -> ReturnCode:
@@ -60,12 +67,14 @@ class Participation:
         self.component.configuration.update()
         code = self.perform(Action.ACTIVATED, handle)
         if code is OK:
+            self._active.add(handle)
             for port in self.component.ports:
                 port.activate()
         return code
 
     def on_deactivated(self, handle: int) -> ReturnCode:
         """The component becomes inactive, its ports before it."""
+        self._active.discard(handle)
         for port in self.component.ports:
             port.deactivate()
         return self.perform(Action.DEACTIVATED, handle)

@@ -302,6 +302,8 @@ class Talker(Component):
     out = OutPort(TimedLong)
     def on_execute(self, context):
         self.out.write(7)
+    def on_deactivated(self, context):
+        print("deactivated", flush=True)
 class Listener(Component):
     values = InPort(TimedLong)
     def on_execute(self, context):
@@ -366,7 +368,7 @@ def test_a_composite_with_a_member_in_another_process(managers: Managers, world:
 def test_a_member_outlives_the_process_of_its_composite(managers: Managers, world: CorbaWorld) -> None:
     """Tools ask it for its contexts and organizations, and would fail at those that have gone; it runs by itself."""
     (managers.folder / "Talkers.py").write_text(TALKERS)
-    managers.start("-o", "manager.components.precreate:Talker")
+    process = managers.start("-o", "manager.components.precreate:Talker")
     wait_until(lambda: world.instance_names() == {"Talker0"})
     composite = managers.start(
         *("-o", "manager.components.precreate:PeriodicECSharedComposite?instance_name=Both"),
@@ -376,8 +378,13 @@ def test_a_member_outlives_the_process_of_its_composite(managers: Managers, worl
     (own,) = talker.get_owned_contexts()
     assert (len(talker.get_organizations()), len(talker.get_participating_contexts())) == (1, 1)
     assert not own.is_running()
+    (shared,) = talker.get_participating_contexts()
+    both = world._component_at("rtcname://*/Both")
+    shared.activate_component(both)
+    wait_until(lambda: str(shared.get_component_state(talker)) == "ACTIVE_STATE")
     composite.kill()
     wait_until(lambda: not talker.get_participating_contexts())
+    managers.wait_for(process, "deactivated")
     assert talker.get_organizations() == []
     assert own.is_running()
     assert own.activate_component(talker)._v == ReturnCode.RTC_OK

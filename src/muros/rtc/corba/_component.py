@@ -222,7 +222,7 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
         component = self.component
         for context in component.participating_contexts:
             if isinstance(context, ForeignContext) and not context.is_there():
-                component.detach_context(component.handle_of(context))
+                component.participation.part(component.handle_of(context))
         if organizations_of(component).leave_those(_has_gone):
             for owned in component.owned_contexts:
                 owned.start()
