@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import CosNaming
 import pytest
 
 from muros.findings import Finding
@@ -104,6 +105,30 @@ def test_names_are_bound_with_their_contexts_and_taken_away(
         server.list(r"robot.host_cxt/a\/b\.c.rtc")
     with pytest.raises(RtcError, match=r"refuses 'nowhere.x'"):
         server.list("nowhere.x")
+
+
+def test_a_walk_looks_into_contexts_once_and_has_limits(
+    orb: Orb, name_server: RunningNameServer, target: Any
+) -> None:
+    server = NameServer(orb, name_server.address)
+    server.bind("a.cxt/b.cxt/deep.rtc", target)
+    server.bind("top.rtc", target)
+    root = server._root()
+    inner, outer = server.resolve("a.cxt/b.cxt"), server.resolve("a.cxt")
+    assert inner is not None
+    inner.bind_context([CosNaming.NameComponent("root", "cxt")], root)
+    inner.bind_context([CosNaming.NameComponent("up", "cxt")], outer)
+    inner.bind_context([CosNaming.NameComponent("self", "cxt")], inner)
+    in_order = [path for path, _ in server.walk()]
+    assert sorted(in_order[:2]) == ["a.cxt", "top.rtc"]
+    assert in_order[2] == "a.cxt/b.cxt"
+    inside = ["deep.rtc", "root.cxt", "self.cxt", "up.cxt"]
+    assert sorted(in_order[3:]) == [f"a.cxt/b.cxt/{name}" for name in inside]
+    assert [path for path, _ in server.walk(contexts=2)] == in_order[:3]
+    assert [path for path, _ in server.walk(bindings=4)] == in_order[:4]
+    assert len(list(server.walk("a.cxt/b.cxt", contexts=1))) == 4
+    with pytest.raises(RtcError, match="not a naming context"):
+        list(server.walk("top.rtc"))
 
 
 def test_more_names_than_come_in_one_answer(orb: Orb, name_server: RunningNameServer, target: Any) -> None:

@@ -11,8 +11,10 @@ from __future__ import annotations
 import contextlib
 import re
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Final, TypeVar
 
 import CosNaming
@@ -29,7 +31,10 @@ DEFAULT_PORT: Final = 2809
 """TCP port of a name server whose address has none."""
 
 LIST_LIMIT: Final = 100_000
-"""Bindings that are listed of one context."""
+"""Bindings that are listed of one context, and told of by one walk."""
+
+WALK_LIMIT: Final = 1000
+"""Contexts that one walk looks into."""
 
 T = TypeVar("T")
 
@@ -136,37 +141,43 @@ class NameServer:
 
     def list(self, path: str = "") -> list[Binding]:
         """What is in a context ("" = the root), in the server's order."""
-        name = _components(path) if path else []
+        context = self._ask(path, lambda root: _context_at(root, path))
+        return [_binding(one) for one in self._listed(path, context)]
 
-        def entries(root: Any) -> list[Any]:
-            context = root.resolve(name)._narrow(CosNaming.NamingContext) if name else root
-            if context is None:
-                raise RtcError(f"name server {self.address}: '{path}' is not a naming context")
-            found, more = context.list(_BATCH)
-            while more is not None and len(found) < LIST_LIMIT:
-                again, some = more.next_n(_BATCH)
-                found += some
-                if not again:
-                    more.destroy()
-                    more = None
-            return found  # type: ignore[no-any-return]
+    def walk(
+        self, path: str = "", *, contexts: int = WALK_LIMIT, bindings: int = LIST_LIMIT
+    ) -> Iterator[tuple[str, Binding]]:
+        """The bindings below a context, with their paths, nearest first.
 
-        return [
-            Binding(
-                one.binding_name[-1].id, one.binding_name[-1].kind, one.binding_type == CosNaming.ncontext
-            )
-            for one in self._ask(path, entries)
-            if one.binding_name
-        ]
+        Each context is looked into once, by its nearest path, though it may have several or contain itself; at most
+        `contexts` are, and at most `bindings` are told of. One that does not answer is skipped, but for the first.
+        """
+        first = self._ask(path, lambda root: _context_at(root, path))
+        seen, waiting = [first], deque([(path, first)])
+        while waiting:
+            place, context = waiting.popleft()
+            try:
+                entries = self._listed(place, context)
+            except RtcError:
+                if context is first:
+                    raise
+                continue
+            for entry in entries[:bindings]:
+                binding = _binding(entry)
+                part = "/".join(filter(None, (place, f"{_quoted(binding.name)}.{_quoted(binding.kind)}")))
+                yield part, binding
+                if binding.is_context and len(seen) < contexts:
+                    with contextlib.suppress(RtcError):
+                        inner = self._ask(part, partial(_inner, context, entry))
+                        if not any(is_same(inner, other) for other in seen):
+                            seen.append(inner)
+                            waiting.append((part, inner))
+            bindings -= len(entries)
+            if bindings <= 0:
+                return
 
-    def walk(self, path: str = "") -> Iterator[tuple[str, Binding]]:
-        """All bindings below a context, with their paths, depth first. A context that does not answer is skipped."""
-        for binding in self.list(path):
-            part = "/".join(filter(None, (path, f"{_quoted(binding.name)}.{_quoted(binding.kind)}")))
-            yield part, binding
-            if binding.is_context:
-                with contextlib.suppress(RtcError):
-                    yield from self.walk(part)
+    def _listed(self, path: str, context: Any) -> Sequence[Any]:
+        return self._ask(path, lambda _: _entries(context))
 
     def _root(self) -> Any:
         if self._context is None:
@@ -304,6 +315,42 @@ class _AtServer:
 
 def _components(path: str) -> list[Any]:
     return [CosNaming.NameComponent(name, kind) for name, kind in split_path(path)]
+
+
+def _context_at(root: Any, path: str) -> Any:
+    """The naming context of a path. RtcError if it is none."""
+    if not path:
+        return root
+    context = root.resolve(_components(path))._narrow(CosNaming.NamingContext)
+    if context is None:
+        raise RtcError(f"'{path}' is not a naming context")
+    return context
+
+
+def _inner(context: Any, entry: Any, root: Any) -> Any:
+    """The context that is bound in `context` as `entry` says. RtcError if it is none."""
+    inner = context.resolve(entry.binding_name)._narrow(CosNaming.NamingContext)
+    if inner is None:
+        raise RtcError("not a naming context")
+    return inner
+
+
+def _entries(context: Any) -> list[Any]:
+    """What is bound in a context, as the server tells it."""
+    found, more = context.list(_BATCH)
+    while more is not None and len(found) < LIST_LIMIT:
+        again, some = more.next_n(_BATCH)
+        found += some
+        if not again:
+            break
+    if more is not None:
+        more.destroy()
+    return [one for one in found if one.binding_name]
+
+
+def _binding(entry: Any) -> Binding:
+    name = entry.binding_name[-1]
+    return Binding(name.id, name.kind, entry.binding_type == CosNaming.ncontext)
 
 
 def is_same(one: Any | None, other: Any | None) -> bool:
