@@ -107,6 +107,13 @@ def test_other_answers(
     assert pair.out.write(long(2))
 
 
+def test_a_receiver_that_is_silent_is_not_said_to_have_answered(pair: Pair, wire: Wire) -> None:
+    pair.connect()
+    wire.fault(PortStatus.BUFFER_TIMEOUT)
+    assert not pair.out.write(long(1))
+    assert [finding.why for finding in pair.findings] == ["it did not answer, or have room, in time"]
+
+
 def test_other_answers_to_a_pull(pair: Pair, wire: Wire) -> None:
     pair.connect({"dataport.dataflow_type": "pull"})
     pair.listen()
@@ -322,6 +329,18 @@ def test_listeners_may_change_the_value(pair: Pair) -> None:
     pair.in_.add_listener(DataEvent.ON_BUFFER_READ, replace)
     pair.out.write(long(10))
     assert pair.in_.read() == long(11)
+
+
+def test_overwriting_where_the_newest_value_is_wanted_is_only_counted(pair: Pair) -> None:
+    profile = pair.connect({"dataport.inport.buffer.length": "1"})
+    for number in range(12):
+        pair.out.write(long(number))
+    link = pair.in_.link(profile.connector_id)
+    assert link is not None
+    assert link.overwritten == 11
+    assert pair.in_.read() == long(11)
+    pair.out.disconnect_all()
+    assert pair.codes() == []
 
 
 def test_overwriting_is_told(pair: Pair) -> None:

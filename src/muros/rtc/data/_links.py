@@ -152,6 +152,8 @@ class Link:
     def overwrote(self) -> None:
         """Count a value lost for a newer one."""
         self.overwritten += 1
+        if self.options.buffer.length == 1:  # the newest value is all that is wanted
+            return
         if _is_power_of_ten(self.overwritten):
             self._tell_of(
                 "values-overwritten",
@@ -319,7 +321,9 @@ class PushSender(Link):
                 "values-refused",
                 self.refused,
                 "not taken by the receiver",
-                f"it answered {answer.name}",
+                "it did not answer, or have room, in time"
+                if answer is PortStatus.BUFFER_TIMEOUT
+                else f"it answered {answer.name}",
                 "have it read oftener, or connect with a longer buffer or another full_policy",
             )
         self.tell(REFUSED_EVENTS.get(answer, DataEvent.ON_RECEIVER_ERROR), sample)
