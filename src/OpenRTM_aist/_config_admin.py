@@ -44,7 +44,8 @@ class ConfigAdmin:
         values = self.getConfigurationSet(config_set).as_dict()
         for parameter in self._configuration.parameters:
             if parameter.name in values and config_param in (None, parameter.name):
-                parameter.take(values[parameter.name])
+                text = values[parameter.name]
+                parameter.take(text, parameter.converted(text)[0])
 
     def getConfigurationSets(self) -> list[Properties]:
         return [to_properties(one) for one in self._configuration.sets()]

@@ -1,6 +1,7 @@
 """Configuration sets: what the recorded component did, step by step, and what parameters take."""
 
 import json
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -147,6 +148,54 @@ def test_a_text_that_cannot_be_converted_is_told_and_the_default_counts() -> Non
     configuration.update()
     assert gain.value == 1.5
     assert told == [("gain", "could not convert string to float: 'much'")]
+
+
+def test_no_lock_is_held_while_texts_are_converted_and_assigned() -> None:
+    configuration = Configuration()
+    seen: list[object] = []
+
+    def ask() -> None:
+        seen.append(configuration.get("default").values["gain"])
+        seen.append(configuration.update())  # somebody does already
+        configuration.set_values(ConfigurationSet("default", "", {"gain": "3"}))
+        configuration.activate("default")
+
+    def elsewhere(value: int) -> int:
+        if value == 2:
+            other = threading.Thread(target=ask, daemon=True)
+            other.start()
+            other.join(10)
+            assert not other.is_alive()
+        return value
+
+    gain = configuration.bind("gain", "1", lambda text: elsewhere(int(text)))
+    offset = configuration.bind("offset", "1", int, lambda value: elsewhere(value))
+    values = {"gain": "2", "offset": "2"}
+    configuration.set_values(ConfigurationSet("default", "", values))
+    configuration.activate("default")
+    assert configuration.update()
+    assert seen == ["2", False, "3", False]
+    assert (gain.value, offset.value) == (2, 2), "what changed meanwhile is for the next update"
+    assert configuration.update()
+    assert (gain.value, offset.value) == (3, 2)
+    assert not configuration.update()
+
+
+def test_an_assignment_that_raises_ends_one_update_only() -> None:
+    def refuse(value: int) -> None:
+        if value == 2:
+            raise RuntimeError("no")
+
+    configuration = Configuration()
+    gain = configuration.bind("gain", "1", int, refuse)
+    for text in ("2", "3"):
+        configuration.set_values(ConfigurationSet("default", "", {"gain": text}))
+        configuration.activate("default")
+        if text == "2":
+            with pytest.raises(RuntimeError):
+                configuration.update()
+    assert configuration.update()
+    assert gain.value == 3
 
 
 def test_a_listener_that_raises_harms_nobody() -> None:

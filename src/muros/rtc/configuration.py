@@ -122,18 +122,18 @@ class Parameter(Generic[T]):
         if assign is not None:
             assign(self.value)
 
-    def take(self, text: str) -> Exception | None:
-        """Take a text over. Returns the error of one that cannot be converted: the default counts then."""
-        self.text = text
-        failure = None
+    def converted(self, text: str) -> tuple[T, Exception | None]:
+        """The value of a text, or the default's with the error of a text that cannot be converted."""
         try:
-            self.value = self._convert(text)
+            return self._convert(text), None
         except Exception as error:  # whatever a user's conversion raises
-            failure = error
-            self.value = self._convert(self.default)
+            return self._convert(self.default), error
+
+    def take(self, text: str, value: T) -> None:
+        """Take a text over, with what it was converted to."""
+        self.text, self.value = text, value
         if self._assign is not None:
-            self._assign(self.value)
-        return failure
+            self._assign(value)
 
 
 class Configuration:
@@ -159,6 +159,7 @@ class Configuration:
         self._active = active if active in self._sets and not active.startswith(HIDDEN) else DEFAULT_SET
         self._changed = True  # the first values are taken over by the first update
         self._in_force = True
+        self._updating = False
         self._parameters: dict[str, Parameter[Any]] = {}
         self._on_bad_text = on_bad_text
         self._lock = threading.RLock()
@@ -285,26 +286,33 @@ class Configuration:
     def update(self) -> bool:
         """Take the active set's values over where something changed: only at a moment the component permits.
 
-        Returns whether there was anything to take over.
+        Returns whether there was anything to take over. No lock is held while texts are converted and assigned: where
+        several threads update, one does, and the others go on; what is changed meanwhile is for the next update.
         """
         if not self._changed or not self._in_force:  # every cycle comes here
             return False
-        taken = []
         with self._lock:
-            if not self._changed or not self._in_force:
+            if self._updating or not self._changed or not self._in_force:
                 return False
             self._changed = False
+            self._updating = True
             active = self._active
             texts = self._sets[active].values
-            for parameter in self._parameters.values():
-                text = texts.get(parameter.name)
-                if text is not None and text != parameter.text:
-                    failure = parameter.take(text)
-                    taken.append((parameter, failure))
-        for parameter, failure in taken:
+            due = [
+                (parameter, text)
+                for parameter in self._parameters.values()
+                if (text := texts.get(parameter.name)) is not None and text != parameter.text
+            ]
+        try:
+            taken = [(parameter, text, *parameter.converted(text)) for parameter, text in due]
+            for parameter, text, value, _ in taken:
+                parameter.take(text, value)
+        finally:
+            self._updating = False
+        for parameter, text, _, failure in taken:
             if failure is not None:
                 self._on_bad_text(parameter, failure)
-            self.listeners.tell(ConfigEvent.UPDATE_CONFIG_PARAM, parameter.name, parameter.text)
+            self.listeners.tell(ConfigEvent.UPDATE_CONFIG_PARAM, parameter.name, text)
         if taken:
             self.listeners.tell(ConfigEvent.UPDATE_CONFIG_SET, active)
         return bool(taken)
