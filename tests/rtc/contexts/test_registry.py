@@ -28,6 +28,12 @@ def test_a_component_that_says_nothing_has_one_periodic_context() -> None:
     assert isinstance(context, PeriodicExecutionContext)
     assert (context.rate, context.kind, context.name) == (1000.0, ExecutionKind.PERIODIC, "")
     assert context.options == ContextOptions()
+    assert context.profile().properties == {
+        "type": "PeriodicExecutionContext",
+        "rate": "1000",
+        "sync_transition": "YES",
+        "transition_timeout": "0.5",
+    }
 
 
 def test_exec_cxt_says_what_the_one_context_is() -> None:
@@ -46,6 +52,8 @@ def test_exec_cxt_says_what_the_one_context_is() -> None:
     assert context.rate == 50.0
     assert (options.sync_activation, options.sync_deactivation, options.sync_reset) == (False, False, True)
     assert (options.activation_timeout, options.reset_timeout) == (3.0, 4.5)
+    told = context.profile().properties
+    assert (told["sync_transition"], told["transition_timeout"], told["sync_reset"]) == ("NO", "3", "yes")
 
 
 def test_several_contexts_by_type_and_name() -> None:
@@ -168,4 +176,6 @@ def test_specs_of_unknown_options_are_shown_but_not_looked_at() -> None:
         "colour": "blue",
         "type": "PeriodicExecutionContext",
         "rate": "1000",
+        "sync_transition": "YES",
+        "transition_timeout": "0.5",
     }

@@ -139,6 +139,10 @@ def test_its_context_and_sets_are_those_of_the_recorded_one(pair: tuple[dict[str
     (theirs,) = wanted["owned_contexts"]
     assert (str(context.get_kind()), context.is_running()) == (theirs["get_kind"], theirs["is_running"])
     assert context.get_rate() == theirs["get_rate"]
+    shown, told = texts_of(context.get_profile().properties), texts(theirs["profile"]["properties"])
+    assert (
+        shown.items() >= {key: told[key] for key in ("type", "sync_transition", "transition_timeout")}.items()
+    )
     assert [reference.get_context_handle(context)] == wanted["context_handles"]
     assert [reference.is_alive(context)] == wanted["is_alive"]
     if wanted["states"] == ["ACTIVE_STATE"]:

@@ -20,7 +20,7 @@ from typing import Final
 from muros.rtc.codes import RtcError
 from muros.rtc.contexts._context import ExecutionContext
 from muros.rtc.contexts._multilayer import MultilayerCompositeEC
-from muros.rtc.contexts._options import ContextOptions, rate_of
+from muros.rtc.contexts._options import TRANSITION_TIMEOUT, ContextOptions, rate_of
 from muros.rtc.contexts._synchronous import SynchronousExecutionContext
 from muros.rtc.contexts._threads import (
     EventDrivenExecutionContext,
@@ -49,6 +49,9 @@ _INHERITED: Final = (
     "transition_patience", "catch_up", "cpu_affinity", "scheduling", "switch_interval",
 )  # fmt: skip
 """Options that a context takes from `exec_cxt.*` where nothing nearer to it says otherwise."""
+
+_SHOWN: Final = {"sync_transition": "YES", "transition_timeout": f"{TRANSITION_TIMEOUT:g}"}
+"""Defaults that the profile of every context tells: tools look for them."""
 
 _FORM: Final = re.compile(r"([\w.:-]+)\s*(?:\(\s*([\w.:-]*)\s*\))?", re.ASCII)
 """`Type`, `Type()` and `Type(name)`."""
@@ -135,7 +138,8 @@ def make_context(
             type_name=spec.type_name,
             rate=rate_of(spec.texts),
             options=ContextOptions.from_properties(spec.texts),
-            properties={key: text for key, text in spec.texts.items() if key not in ("type", "rate")},
+            properties=_SHOWN
+            | {key: text for key, text in spec.texts.items() if key not in ("type", "rate")},
             clock=clock,
             report=reporter.take if reporter is not None else None,
         )
