@@ -10,7 +10,7 @@ from muros.rtc.codes import DataPortStatus as Status
 from muros.rtc.data import Changes, ConnectorEvent, DataEvent, DataInPort, DataOutPort
 from muros.rtc.data import ConnectorInfo as Info
 from muros.rtc.data_types import data_type_of
-from OpenRTM_aist._ports import PortBase
+from OpenRTM_aist._ports import PortBase, port_reference
 from OpenRTM_aist._properties import Properties
 
 __all__ = [
@@ -129,8 +129,13 @@ class ConnectorInfo:
     def __init__(self, info: Info) -> None:
         self.name = info.name
         self.id = info.connector_id
-        self.ports = list(info.ports)
         self.properties = Properties.of(info.properties)
+        self._ports = info.ports
+
+    @property
+    def ports(self) -> list[Any]:
+        """The references of the ports connected."""
+        return [port_reference(port) for port in self._ports]
 
 
 class ConnectorDataListener:

@@ -17,6 +17,7 @@ __all__ = [
     "PortConnectListenerType",
     "PortConnectRetListener",
     "PortConnectRetListenerType",
+    "port_reference",
 ]
 
 
@@ -70,10 +71,12 @@ class PortBase:
         self._listeners: dict[tuple[int, Any], Callable[..., Any]] = {}
 
     def name(self) -> str:
+        """The name given: `in`."""
         return self.port.name
 
     def getName(self) -> str:
-        return self.port.name
+        """The one that others know, with the component's: `Comp0.in`."""
+        return self.port.full_name
 
     def getPortRef(self) -> Any:
         """The reference that others call; None before the component is known to them."""
@@ -142,9 +145,9 @@ class PortBase:
 
 
 def _profile(profile: ConnectorProfile) -> Any:
-    return to_connector_profile(profile, [_reference(port) for port in profile.ports])
+    return to_connector_profile(profile, [port_reference(port) for port in profile.ports])
 
 
-def _reference(port: Any) -> Any:
+def port_reference(port: Any) -> Any:
     """What leads to a port of a connection, of this process or another; None where it is not known."""
     return PortBase(port).getPortRef() if isinstance(port, Port) else getattr(port, "reference", None)

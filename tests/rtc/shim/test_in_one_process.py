@@ -243,6 +243,9 @@ def test_listeners_of_connectors(manager: rtm.Manager) -> None:
     ports.out.write()
     assert ports.into.read().data == 107
     assert heard == [("corba_cdr", 2), ("data", "wire", 7)]
+    (info,) = ports.into.connectors()
+    assert [one.get_port_profile().name for one in info.ports] == [ports.out.getName(), ports.into.getName()]
+    assert info.ports[1]._is_equivalent(ports.into.getPortRef())
     ports.into.removeConnectorDataListener(kinds.ON_RECEIVED, data)
     ports.into.removeConnectorDataListener(kinds.ON_RECEIVED, data)
     ports.out.removeConnectorListener(rtm.ConnectorListenerType.ON_CONNECT, connection)
@@ -281,7 +284,7 @@ def test_ports_tell_of_themselves(manager: rtm.Manager) -> None:
         ("out", "wire", 2, False),
         ("out", True, "push"),
     ]
-    assert (ports.out.getName(), ports.out.name()) == ("out", "out")
+    assert (ports.out.getName(), ports.out.name()) == (f"{ports.getInstanceName()}.out", "out")
     assert ports.out.getPortDataType() == "IDL:RTC/TimedLong:1.0"
     assert ports.out.getPortRef().get_port_profile().name == "Ports0.out"
     assert ports.out.properties().getProperty("port.port_type") == ""
