@@ -48,7 +48,11 @@ class Participation:
 
     def part(self, handle: int) -> None:
         """The context of `handle` has gone without a word: what it activated is deactivated here."""
-        if handle in self._active:
+        try:
+            self._active.remove(handle)
+        except KeyError:
+            pass  # it was not active, or another thread has noticed it, too
+        else:
             self.on_deactivated(handle)
         self.detach_context(handle)
 

@@ -59,6 +59,8 @@ class MemoryWorld:
 
     def update_names(self) -> None: ...
 
+    def part_with_the_gone(self) -> None: ...
+
     def is_free(self, name: str) -> bool:
         return name not in self.server.bound
 

@@ -390,6 +390,29 @@ def test_a_member_outlives_the_process_of_its_composite(managers: Managers, worl
     assert own.activate_component(talker)._v == ReturnCode.RTC_OK
 
 
+def test_a_member_notices_by_itself_that_its_composite_has_gone(
+    managers: Managers, world: CorbaWorld
+) -> None:
+    """No tool asks it for anything after the process was killed."""
+    (managers.folder / "Talkers.py").write_text(TALKERS)
+    process = managers.start(
+        *("-o", "manager.components.precreate:Talker", "-o", "naming.update.interval:0.2")
+    )
+    wait_until(lambda: world.instance_names() == {"Talker0"})
+    composite = managers.start(
+        *("-o", "manager.components.precreate:PeriodicECSharedComposite?instance_name=Both"),
+        *("-o", "composite.PeriodicECShared.Both.conf.default.members:Talker0"),
+    )
+    talker = world._component_at("rtcname://*/Talker0")
+    (own,) = talker.get_owned_contexts()
+    (shared,) = talker.get_participating_contexts()
+    shared.activate_component(world._component_at("rtcname://*/Both"))
+    wait_until(lambda: str(shared.get_component_state(talker)) == "ACTIVE_STATE")
+    composite.kill()
+    managers.wait_for(process, "deactivated")
+    wait_until(own.is_running)
+
+
 STUCK = """
 import threading
 from muros.rtc import Component

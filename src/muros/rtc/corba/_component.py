@@ -108,7 +108,7 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
         return [self._objects.context(context) for context in self.component.owned_contexts]
 
     def get_participating_contexts(self) -> list[Any]:
-        self._part_with_the_gone()
+        self.part_with_the_gone()
         return [self._objects.context(context) for context in self.component.participating_contexts]
 
     def get_context_handle(self, cxt: Any) -> int:
@@ -172,7 +172,7 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
         return [self._objects.organization(one) for one in organizations_of(self.component).owned]
 
     def get_organizations(self) -> list[Any]:
-        self._part_with_the_gone()
+        self.part_with_the_gone()
         return [
             self._objects.organization(one) if isinstance(one, Organization) else one
             for one in organizations_of(self.component).joined
@@ -214,7 +214,19 @@ class ComponentServant(OpenRTM__POA.DataFlowComponent):  # type: ignore[misc]
     def get_status(self, name: str) -> Any:
         raise SDOPackage.InvalidParameter(f"{self.component.instance_name} has no status '{name}'")
 
-    def _part_with_the_gone(self) -> None:
+    # What others leave behind
+
+    def belongs_elsewhere(self) -> bool:
+        """Whether it has contexts or organizations of other processes."""
+        contexts, organizations = (
+            self.component.participating_contexts,
+            organizations_of(self.component).joined,
+        )
+        return any(isinstance(one, ForeignContext) for one in contexts) or any(
+            not isinstance(one, Organization) for one in organizations
+        )
+
+    def part_with_the_gone(self) -> None:
         """Let go of contexts and organizations whose processes have ended: tools would fail at each of them.
 
         A member of a composite that has gone runs by itself again.

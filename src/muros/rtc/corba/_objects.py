@@ -71,6 +71,19 @@ class Objects:
         for one in gone:
             self.orb.deactivate(one)
 
+    def part_with_the_gone(self) -> None:
+        """Let components part with what other processes have left behind: asks these, which may take its time."""
+        for servant in self.belonging_elsewhere():
+            servant.part_with_the_gone()
+
+    def belonging_elsewhere(self) -> list[ComponentServant]:
+        """The components that have contexts or organizations of other processes. Nobody is asked."""
+        from muros.rtc.component import Component
+
+        with self._lock:
+            servants = [servant for model, servant in self._servants.items() if isinstance(model, Component)]
+        return [servant for servant in servants if servant.belongs_elsewhere()]
+
     def component(self, component: Component) -> Any:
         """The reference to a component of this process."""
         return self._offered(component)

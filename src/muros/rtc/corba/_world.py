@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from threading import Thread
 from typing import TYPE_CHECKING, Any, Final
 
 from muros.rtc.codes import PeerLostError, RtcError
 from muros.rtc.corba._conversion import to_nv_list
-from muros.rtc.corba._lost import peer
+from muros.rtc.corba._lost import QUICK_SECONDS, peer
 from muros.rtc.corba._manager import ManagerServant, PeerManager
 from muros.rtc.corba._naming import NameServer
 from muros.rtc.corba._orb import Orb, current_orb, start_orb
@@ -50,12 +51,15 @@ class CorbaWorld:
         self._registration: Final = Registration(self.orb, servers, reporter)
         self._objects: Final = set_up(self.orb, report=reporter.take)
         self._manager: ManagerServant | None = None
+        self._looking: Thread | None = None
 
     def properties(self) -> Mapping[str, str]:
         return {"corba.id": "omniORB"}
 
     def close(self) -> None:
         self._registration.close()
+        if self._looking is not None:
+            self._looking.join(2 * QUICK_SECONDS)
         if self._owns_orb:
             self.orb.shutdown()
 
@@ -89,6 +93,14 @@ class CorbaWorld:
 
     def update_names(self) -> None:
         self._registration.update()
+
+    def part_with_the_gone(self) -> None:
+        """In a thread of its own, for those asked may be silent; while it asks, no other one starts."""
+        if self._looking is not None and self._looking.is_alive():
+            return
+        if self._objects.belonging_elsewhere():
+            self._looking = Thread(target=self._objects.part_with_the_gone, name="rtc-gone", daemon=True)
+            self._looking.start()
 
     def is_free(self, name: str) -> bool:
         return self._registration.is_free(name)

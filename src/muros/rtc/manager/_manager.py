@@ -175,6 +175,7 @@ class Manager:
         if self.settings.flag("naming.enable") and self.settings.flag("naming.update.enable"):
             self._every("naming.update.interval", world.update_names)
             self._every("naming.update.interval", self._topics.update)
+        self._every("naming.update.interval", world.part_with_the_gone)
         self.timer.every(1.0, self.reporter.tick)
         for name in self.settings.words("manager.modules.preload"):
             self._try("preload", name, partial(self.load_module, name))

@@ -95,6 +95,10 @@ class World(Protocol):
         """Bind what servers lack. Raises nothing."""
         ...
 
+    def part_with_the_gone(self) -> None:
+        """Let components part with contexts and composites whose processes have ended. Returns at once."""
+        ...
+
     def is_free(self, name: str) -> bool:
         """Whether no living object has the name at any name server that answers."""
         ...
