@@ -4,6 +4,7 @@ A tree is a mapping from a path as the board sees it (``muros/xrce/serial.py``) 
 """
 
 import hashlib
+import os
 from collections.abc import Iterable, Mapping
 
 from muros.cli import _floor
@@ -55,7 +56,7 @@ def _cached(path: str, content: bytes, march: str | None, compile_: _floor.Compi
     cached = _CACHE / f"{key}.mpy"
     if not cached.exists():
         _CACHE.mkdir(parents=True, exist_ok=True)
-        fresh = _CACHE / f"{key}.new"
+        fresh = _CACHE / f"{key}.{os.getpid()}.new"  # several processes may compile it at once
         try:
             fresh.write_bytes(compile_(path, content, march))
         except CompileError as error:
