@@ -15,7 +15,6 @@ from muros.rtc.corba._stubs import RTC, OpenRTM, SDOPackage
 VECTORS = Path(__file__).parents[2] / "vectors" / "rtc"
 
 OTHER = {
-    "dataport.dataflow_type",  # duplex is missing, as is its interface type csp_channel
     "dataport.interface_type",
     "dataport.marshaling_types",  # ours has more of both
 }

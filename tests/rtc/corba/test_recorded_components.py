@@ -24,7 +24,7 @@ NAMES = (
 )
 
 OTHER = {
-    "dataport.dataflow_type",  # duplex is missing, as is its interface type csp_channel; events are not pulled
+    "dataport.dataflow_type",  # events are pushed only
     "dataport.interface_type",
     "dataport.marshaling_types",  # ours has more of both
 }

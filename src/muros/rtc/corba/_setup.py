@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from muros.findings import Finding
+from muros.rtc.corba._channel import CspChannel
 from muros.rtc.corba._codec import data_type_of
 from muros.rtc.corba._importer import install
 from muros.rtc.corba._objects import Objects
@@ -30,6 +31,7 @@ def set_up(orb: Orb, *, report: Callable[[Finding], object] = lambda finding: No
     use_service_objects(OrbServiceObjects(orb))
     for name, transport in (("corba_cdr", corba_cdr(orb)), ("data_service", data_service(orb))):
         register_transport(name, push=transport, pull=transport)
+    register_transport("csp_channel", duplex=CspChannel(orb))
     if is_available():
         shared = SharedMemoryTransport(orb)
         register_transport("shared_memory", push=shared, pull=shared)

@@ -22,7 +22,15 @@ from muros.rtc.corba._stubs import RTC, RTC__POA, OpenRTM, OpenRTM__POA
 from muros.rtc.data import Connection, Get, Inlet, Offer, Outlet, Put, TransportError
 from muros.rtc.profiles import ConnectorProfile, PropertyValue
 
-__all__ = ["CorbaOffer", "CorbaTransport", "corba_cdr", "data_service", "reference_in"]
+__all__ = [
+    "CorbaInlet",
+    "CorbaOffer",
+    "CorbaOutlet",
+    "CorbaTransport",
+    "corba_cdr",
+    "data_service",
+    "reference_in",
+]
 
 _CDR: Final = tuple(OpenRTM.PortStatus._items)
 _SERVICE: Final = tuple(RTC.PortStatus._items)
@@ -95,13 +103,13 @@ class CorbaTransport:
         """Of the OutPort: the InPort's object."""
         _, interface, operation = self._inlet
         target = reference_in(connection.profile, self._name("inport"), interface, self._orb)
-        return _Inlet(getattr(target, operation), connection)
+        return CorbaInlet(getattr(target, operation), connection)
 
     def reach_outlet(self, connection: Connection) -> Outlet:
         """Of the InPort: the OutPort's object."""
         _, interface, operation = self._outlet
         target = reference_in(connection.profile, self._name("outport"), interface, self._orb)
-        return _Outlet(getattr(target, operation), connection)
+        return CorbaOutlet(getattr(target, operation), connection)
 
     def _name(self, side: str) -> str:
         return f"dataport.{self._key}.{side}"
@@ -161,7 +169,9 @@ class _Caller:
         return PortStatus.UNKNOWN_ERROR
 
 
-class _Inlet(_Caller):
+class CorbaInlet(_Caller):
+    """An InPort's object."""
+
     def put(self, octets: bytes) -> PortStatus:
         """Call the InPort's object."""
         try:
@@ -172,7 +182,9 @@ class _Inlet(_Caller):
         return _STATUS[answer]
 
 
-class _Outlet(_Caller):
+class CorbaOutlet(_Caller):
+    """An OutPort's object."""
+
     def get(self) -> tuple[PortStatus, bytes]:
         """Call the OutPort's object."""
         try:

@@ -24,7 +24,10 @@ from muros.rtc.data._serializers import (
 )
 from muros.rtc.data._transports import (
     TRANSPORTS,
+    ChannelInlet,
+    ChannelOutlet,
     Connection,
+    DuplexTransport,
     Get,
     Inlet,
     Offer,
@@ -48,6 +51,8 @@ __all__ = [
     "AnyDataType",
     "BufferOptions",
     "Changes",
+    "ChannelInlet",
+    "ChannelOutlet",
     "Connection",
     "ConnectorEvent",
     "ConnectorInfo",
@@ -57,6 +62,7 @@ __all__ = [
     "DataOutPort",
     "DataPort",
     "DataType",
+    "DuplexTransport",
     "EmptyPolicy",
     "FullPolicy",
     "Get",

@@ -57,6 +57,8 @@ class Dataflow(Enum):
 
     PUSH = "push"
     PULL = "pull"
+    DUPLEX = "duplex"
+    """Both: whoever comes second."""
 
 
 class Subscription(Enum):
@@ -173,7 +175,7 @@ def parse_options(options: Mapping[str, str], side: Side) -> DataOptions:
         push_rate=_push_rate(options, remarks),
         skip_count=_number(options, "publisher.skip_count", int, 0, remarks),
         stamps=_stamps(options, remarks),
-        buffer=_buffer_options(options, interface_type, side, remarks),
+        buffer=_buffer_options(options, interface_type, dataflow, side, remarks),
         remarks=tuple(remarks),
     )
 
@@ -184,9 +186,10 @@ def _dataflow(options: Mapping[str, str]) -> Dataflow:
         if dataflow.value == name:
             return dataflow
     if not name:
-        raise OptionError(ReturnCode.BAD_PARAMETER, "dataport.dataflow_type is missing: push or pull")
+        raise OptionError(ReturnCode.BAD_PARAMETER, "dataport.dataflow_type is missing: push, pull or duplex")
     raise OptionError(
-        ReturnCode.BAD_PARAMETER, f"dataport.dataflow_type: {name!r} is not to be had; ask for push or pull"
+        ReturnCode.BAD_PARAMETER,
+        f"dataport.dataflow_type: {name!r} is not to be had; ask for push, pull or duplex",
     )
 
 
@@ -201,7 +204,7 @@ def _subscription(options: Mapping[str, str]) -> Subscription:
 
 
 def _buffer_options(
-    options: Mapping[str, str], interface_type: str, side: Side, remarks: list[str]
+    options: Mapping[str, str], interface_type: str, dataflow: Dataflow, side: Side, remarks: list[str]
 ) -> BufferOptions:
     direct = interface_type == "direct" and side is Side.IN
     length = _number(options, "buffer.length", int, 1 if direct else LENGTH, remarks, least=1)
@@ -210,9 +213,12 @@ def _buffer_options(
         length = MAX_LENGTH
     # Who is asked for a value he does not have says so: a value that was fetched is not given again.
     empty = EmptyPolicy.READBACK if side is Side.IN else EmptyPolicy.DO_NOTHING
+    full = FullPolicy.OVERWRITE
+    if dataflow is Dataflow.DUPLEX:  # nothing is kept: writer and reader wait for each other
+        length, full, empty = MAX_LENGTH, FullPolicy.BLOCK, EmptyPolicy.BLOCK
     return BufferOptions(
         length=length,
-        full_policy=_choice(options, "buffer.write.full_policy", FullPolicy, FullPolicy.OVERWRITE, remarks),
+        full_policy=_choice(options, "buffer.write.full_policy", FullPolicy, full, remarks),
         write_timeout=_number(options, "buffer.write.timeout", float, TIMEOUT, remarks),
         empty_policy=_choice(options, "buffer.read.empty_policy", EmptyPolicy, empty, remarks),
         read_timeout=_number(options, "buffer.read.timeout", float, TIMEOUT, remarks),

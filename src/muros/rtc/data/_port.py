@@ -119,7 +119,8 @@ class DataPort(Port, Generic[T]):
         try:
             connection, options = self._understand(profile)
             if options.dataflow is not self.calls:
-                link = self._receiving_link(connection, options)
+                duplex = options.dataflow is Dataflow.DUPLEX
+                link = (self._channel_link if duplex else self._receiving_link)(connection, options)
                 self._add(profile, (link,))
                 if link.offer is not None:
                     place = profile.ports.index(self)
@@ -135,6 +136,8 @@ class DataPort(Port, Generic[T]):
             connection, options = self._understand(profile)
             if options.dataflow is self.calls:
                 self._add(profile, self._calling_links(connection, options))
+            elif options.dataflow is Dataflow.DUPLEX:
+                self._reach_channel(connection, options)
             for remark in options.remarks:
                 self._tell("bad-connection-option", f"connection {profile.name}: {remark}")
         except OptionError as error:
@@ -171,6 +174,14 @@ class DataPort(Port, Generic[T]):
         """One for each port that this one calls."""
         return (self._calling_link(connection, options),)
 
+    def _channel_link(self, connection: Connection, options: DataOptions) -> Link:
+        """The connector of a duplex connection, with what it offers."""
+        raise NotImplementedError
+
+    def _reach_channel(self, connection: Connection, options: DataOptions) -> None:
+        """Lead the duplex connection's connector to the other side. TransportError where the way leads nowhere."""
+        raise NotImplementedError
+
     def _all_links(self) -> tuple[Link, ...]:
         return tuple(link for links in self._links_by_id.values() for link in links)
 
@@ -203,11 +214,11 @@ class DataPort(Port, Generic[T]):
     # ---- inside
 
     def _abilities(self) -> dict[str, str]:
-        push, pull = set(TRANSPORTS.push) | {DIRECT}, set(TRANSPORTS.pull) | {DIRECT}
+        known = {DIRECT, *TRANSPORTS.push, *TRANSPORTS.pull, *TRANSPORTS.duplex}
         abilities = {
             "dataport.data_type": self.data_type.repository_id,
-            "dataport.interface_type": ",".join(sorted(push | pull)),
-            "dataport.dataflow_type": "push,pull",
+            "dataport.interface_type": ",".join(sorted(known)),
+            "dataport.dataflow_type": "push,pull,duplex" if TRANSPORTS.duplex else "push,pull",
             "dataport.subscription_type": "Any",
             "dataport.marshaling_types": ",".join(marshaling_types(self.data_type)),
             "data_type": self.data_type.repository_id,
@@ -223,13 +234,26 @@ class DataPort(Port, Generic[T]):
         options = parse_options(effective, self.side)
         self._check_data_types(profile)
         interface = options.interface_type
-        transports = TRANSPORTS.push if options.dataflow is Dataflow.PUSH else TRANSPORTS.pull
-        if interface != DIRECT and interface not in transports:
-            known = ", ".join(sorted({DIRECT, *transports}))
+        there = {
+            Dataflow.PUSH: {DIRECT, *TRANSPORTS.push},
+            Dataflow.PULL: {DIRECT, *TRANSPORTS.pull},
+            Dataflow.DUPLEX: set(TRANSPORTS.duplex),
+        }[options.dataflow]
+        if interface not in there:
             raise OptionError(
                 ReturnCode.BAD_PARAMETER,
                 f"dataport.interface_type: {interface!r} with {options.dataflow.value} is not to be had; "
-                f"ask for one of {known}",
+                f"ask for one of {', '.join(sorted(there))}",
+            )
+        ways = self._abilities()["dataport.dataflow_type"]
+        if options.dataflow is Dataflow.DUPLEX and options.dataflow.value not in ways.split(","):
+            raise OptionError(
+                ReturnCode.BAD_PARAMETER, f"dataport.dataflow_type: duplex is not to be had here, only {ways}"
+            )
+        if options.dataflow is Dataflow.DUPLEX and len(profile.ports) != 2:
+            raise OptionError(
+                ReturnCode.BAD_PARAMETER,
+                f"{interface}: a channel joins an OutPort and an InPort, not {len(profile.ports)} port(s)",
             )
         marshaling = options.marshaling
         if not marshaling:

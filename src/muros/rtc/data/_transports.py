@@ -6,6 +6,7 @@ made from those properties afterwards.
 
     push    InPort  `offer_inlet(put)`    ...properties...>   OutPort `reach_inlet()`  .put(octets)
     pull    OutPort `offer_outlet(get)`   ...properties...>   InPort  `reach_outlet()` .get()
+    duplex  both: each offers one end and reaches the other's
 """
 
 from __future__ import annotations
@@ -21,7 +22,10 @@ from muros.rtc.profiles import ConnectorProfile, PropertyValue
 
 __all__ = [
     "TRANSPORTS",
+    "ChannelInlet",
+    "ChannelOutlet",
     "Connection",
+    "DuplexTransport",
     "Get",
     "Inlet",
     "Offer",
@@ -117,12 +121,43 @@ class PullTransport(Protocol):
         """Of the InPort: the way to the OutPort that the profile's properties tell of. TransportError if none does."""
 
 
+class ChannelInlet(Inlet, Protocol):
+    """The way to an InPort that takes a value only when somebody reads it; else `put` gives BUFFER_FULL."""
+
+    def is_writable(self, retry: bool) -> bool:
+        """Whether somebody reads. `retry`: not for the first time. PeerLostError if nobody answers."""
+
+
+class ChannelOutlet(Outlet, Protocol):
+    """The way to an OutPort that has a value only while somebody writes it."""
+
+    def is_readable(self, retry: bool) -> bool:
+        """Whether somebody writes. `retry`: not for the first time. PeerLostError if nobody answers."""
+
+
+class DuplexTransport(Protocol):
+    """Octets are brought or fetched, by whoever comes second."""
+
+    def offer_inlet(self, connection: Connection, put: Put, writable: Callable[[], bool]) -> Offer:
+        """Of the InPort: an object that calls `put` and `writable`."""
+
+    def offer_outlet(self, connection: Connection, get: Get, readable: Callable[[], bool]) -> Offer:
+        """Of the OutPort: an object that calls `get` and `readable`."""
+
+    def reach_inlet(self, connection: Connection) -> ChannelInlet:
+        """Of the OutPort: the way to the InPort. TransportError if the profile's properties lead nowhere."""
+
+    def reach_outlet(self, connection: Connection) -> ChannelOutlet:
+        """Of the InPort: the way to the OutPort. TransportError if the profile's properties lead nowhere."""
+
+
 class _Registry:
     """Transports by `dataport.interface_type`."""
 
     def __init__(self) -> None:
         self.push: Final[dict[str, PushTransport]] = {}
         self.pull: Final[dict[str, PullTransport]] = {}
+        self.duplex: Final[dict[str, DuplexTransport]] = {}
         self.marshaling: Final[dict[str, Callable[[AnyDataType], str]]] = {}
         """The serializer of a data type on a transport, where the connection names none and it is not `cdr`."""
 
@@ -136,6 +171,7 @@ def register_transport(
     *,
     push: PushTransport | None = None,
     pull: PullTransport | None = None,
+    duplex: DuplexTransport | None = None,
     marshaling: Callable[[AnyDataType], str] | None = None,
 ) -> None:
     """Let connections ask for `dataport.interface_type` = `interface_type`, with the dataflow types given.
@@ -148,6 +184,8 @@ def register_transport(
         TRANSPORTS.push[interface_type] = push
     if pull is not None:
         TRANSPORTS.pull[interface_type] = pull
+    if duplex is not None:
+        TRANSPORTS.duplex[interface_type] = duplex
 
 
 def offered_in(

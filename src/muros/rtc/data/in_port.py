@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Final, TypeVar
 
 from muros.findings import Finding
 from muros.rtc.codes import BufferStatus, DataPortStatus, PortStatus, PortType, ReturnCode
+from muros.rtc.data._channel import ASK_AGAIN, ChannelReceiver, Demand
 from muros.rtc.data._links import InLink, Link, PullFetcher, PullSource, PushReceiver
 from muros.rtc.data._listeners import ConnectorEvent, DataEvent
 from muros.rtc.data._options import Dataflow, DataOptions, OptionError, Side
@@ -64,6 +65,9 @@ class DataInPort(DataPort[T]):
         self._condition: Final = threading.Condition(threading.Lock())
         self._arrivals: Final = itertools.count(1)
         self._pushed: tuple[PushReceiver, ...] = ()
+        self._channels: tuple[ChannelReceiver, ...] = ()
+        """Those of `_pushed` that are."""
+        self._demand: Final = Demand()
         self._pulled: tuple[PullFetcher, ...] = ()
         self._last: tuple[InLink, Sample] | None = None
 
@@ -107,13 +111,14 @@ class DataInPort(DataPort[T]):
     def is_new(self, names: str | Iterable[str] | None = None) -> bool:
         """Whether a value waits that was not read: at any connection, or at those of these names or ids.
 
-        Pulled connections whose sender is in another process are not asked: False, just read.
+        Pulled connections whose sender is in another process are not asked: False, just read. Those of `csp_channel`
+        are: True while a writer waits.
         """
         if names is None:
             for link in self._pushed:
                 if link.buffer.ring:
                     return True
-            return any(link.is_new() for link in self._pulled)
+            return any(link.is_new() for link in (*self._channels, *self._pulled))
         wanted = (names,) if isinstance(names, str) else tuple(names)
         return any(link.is_new() for name in wanted for kind in self._chosen(name) for link in kind)
 
@@ -127,7 +132,7 @@ class DataInPort(DataPort[T]):
 
     def read_before(self) -> bool:
         """Read into `value`; whether it was a new one. For components that read all ports before they run."""
-        fresh = self.is_new() or bool(self._pulled)
+        fresh = self.is_new() or bool(self._pulled or self._channels)
         status, value = self.try_read()
         if fresh and status is DataPortStatus.PORT_OK:
             self.value = value
@@ -173,6 +178,9 @@ class DataInPort(DataPort[T]):
         """Nothing waits: wait, or read back, as the connection says that was read last."""
         last = self._last[0] if self._last is not None else None
         lead = next((link for link in pushed if link is last), pushed[0])
+        channels = [link for link in pushed if isinstance(link, ChannelReceiver)]
+        if channels:
+            return self._meet(lead, pushed, channels)
         with self._condition:
             buffer = lead.buffer
             if buffer.options.empty_policy is EmptyPolicy.BLOCK:
@@ -188,6 +196,47 @@ class DataInPort(DataPort[T]):
             else:
                 status, sample = lead.read_back()
                 taken = None if sample is None else (lead, sample)
+        return self._told(lead, status, taken)
+
+    def _meet(
+        self, lead: PushReceiver, pushed: tuple[PushReceiver, ...], channels: list[ChannelReceiver]
+    ) -> tuple[DataPortStatus, InLink | None, Sample | None]:
+        """Nothing waits here: see whether a writer does, or wait until one comes, as `lead` says."""
+        options = lead.buffer.options
+        deadline = self._clock() + options.read_timeout if options.read_timeout > 0 else None
+        while True:
+            refused = self._demand.refused
+            for channel in tuple(channels):
+                status = channel.ask()
+                if status is DataPortStatus.PORT_OK:
+                    break
+                if status is not DataPortStatus.BUFFER_EMPTY:
+                    channels.remove(channel)
+                if status is DataPortStatus.CONNECTION_LOST:
+                    self._drop(channel.info.connector_id)
+            with self._condition:
+                left = ASK_AGAIN if deadline is None else deadline - self._clock()
+                waits = options.empty_policy is EmptyPolicy.BLOCK and left > 0 and bool(channels)
+                if waits and refused == self._demand.refused and not any(link.buffer.ring for link in pushed):
+                    wish = self._demand.wish()
+                    self._condition.wait(min(left, ASK_AGAIN))
+                    self._demand.withdraw(wish)
+                taken = self._take_oldest(pushed)
+                if taken is not None or not waits:
+                    break
+        if taken is None and channels:
+            if options.empty_policy is EmptyPolicy.BLOCK:
+                status = DataPortStatus.BUFFER_TIMEOUT
+            else:
+                with self._condition:
+                    status, sample = lead.read_back()
+                taken = None if sample is None else (lead, sample)
+        return self._told(lead, status, taken)
+
+    def _told(
+        self, lead: PushReceiver, status: DataPortStatus, taken: tuple[InLink, Sample] | None
+    ) -> tuple[DataPortStatus, InLink | None, Sample | None]:
+        """What was taken, or `status` why nothing was; the listeners hear of it."""
         if taken is not None:
             taken[0].tell(DataEvent.ON_BUFFER_READ, taken[1])
             return DataPortStatus.PORT_OK, *taken
@@ -239,6 +288,19 @@ class DataInPort(DataPort[T]):
         waiting = None if source is None else lambda: source.waiting
         return PullFetcher(self._setup(connection, options), self._condition, self._arrivals, outlet, waiting)
 
+    def _channel_link(self, connection: Connection, options: DataOptions) -> Link:
+        link = ChannelReceiver(
+            self._setup(connection, options), self._condition, self._arrivals, self._demand
+        )
+        transport = TRANSPORTS.duplex[options.interface_type]
+        link.offer = transport.offer_inlet(connection, link.put, link.is_writable)
+        return link
+
+    def _reach_channel(self, connection: Connection, options: DataOptions) -> None:
+        outlet = TRANSPORTS.duplex[options.interface_type].reach_outlet(connection)
+        if isinstance(link := self.link(connection.profile.connector_id), ChannelReceiver):
+            link.reach(outlet)
+
     def _links_changed(self) -> None:
         links = self._all_links()
         # What came before its connection ended can still be read: a sender may write and leave.
@@ -246,6 +308,7 @@ class DataInPort(DataPort[T]):
         for link in ended[:-ENDED]:
             link.forgotten()
         self._pushed = (*ended[-ENDED:], *(link for link in links if isinstance(link, PushReceiver)))
+        self._channels = tuple(link for link in self._pushed if isinstance(link, ChannelReceiver))
         self._pulled = tuple(link for link in links if isinstance(link, PullFetcher))
 
 

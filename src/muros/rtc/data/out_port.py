@@ -9,6 +9,7 @@ from typing import ClassVar, TypeVar, cast
 
 from muros.findings import Finding
 from muros.rtc.codes import DataPortStatus, PortType, ReturnCode
+from muros.rtc.data._channel import ChannelSender
 from muros.rtc.data._links import Link, OutLink, PullSource, PushReceiver, PushSender
 from muros.rtc.data._options import Dataflow, DataOptions, OptionError, Side, Stamp
 from muros.rtc.data._port import DIRECT, DataPort
@@ -128,6 +129,17 @@ class DataOutPort(DataPort[T]):
                 for profile in each_offer(connection.profile)
             ]
         return tuple(PushSender(self._setup(connection, options), inlet) for inlet in inlets)
+
+    def _channel_link(self, connection: Connection, options: DataOptions) -> Link:
+        link = ChannelSender(self._setup(connection, options))
+        transport = TRANSPORTS.duplex[options.interface_type]
+        link.offer = transport.offer_outlet(connection, link.writer.get, link.writer.is_readable)
+        return link
+
+    def _reach_channel(self, connection: Connection, options: DataOptions) -> None:
+        inlet = TRANSPORTS.duplex[options.interface_type].reach_inlet(connection)
+        if isinstance(link := self.link(connection.profile.connector_id), ChannelSender):
+            link.writer.reach(inlet)
 
     def _links_changed(self) -> None:
         links = self._all_links()
