@@ -58,6 +58,7 @@ def test_a_component_in_all_detail(world: World) -> None:
         ["dataport.interface_type=data_service"],
         ["dataport.interface_type=shared_memory", "dataport.subscription_type=flush"],
         ["dataport.interface_type=direct", "dataport.subscription_type=flush"],
+        ["dataport.interface_type=csp_channel", "dataport.dataflow_type=duplex"],
         ["dataport.serializer.cdr.endian=big,little"],
     ],
     ids=lambda words: ",".join(words) or "default",

@@ -284,9 +284,11 @@ def test_a_put_and_a_get_at_the_same_time_give_one_value(
 
 
 def test_a_put_while_the_reader_asks_is_neither_taken_nor_missed(
-    pair: Pair, memory: Memory, pool: ThreadPoolExecutor
+    pair: Pair, memory: Memory, pool: ThreadPoolExecutor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What get found is read before what comes meanwhile; and who found nothing asks again."""
+    for module in ("_channel", "in_port"):
+        monkeypatch.setattr(f"muros.rtc.data.{module}.ASK_AGAIN", 10 * WAIT)
     forever = {"dataport.buffer.write.timeout": "0", "dataport.buffer.read.timeout": "0"}
     pair.connect({**CHANNEL, **forever})
     answered, go = threading.Event(), threading.Event()
@@ -305,7 +307,7 @@ def test_a_put_while_the_reader_asks_is_neither_taken_nor_missed(
     written = writing(pool, pair, 1)
     assert not read.done()
     go.set()
-    assert read.result(1.0) == long(1), "without waiting for the next look"
+    assert read.result(WAIT) == long(1), "without waiting for the next look"
     assert written.result(WAIT)
 
     answered.clear()
