@@ -177,14 +177,23 @@ class Demand:
 
 
 class ChannelReceiver(PushReceiver):
-    """Takes a value when somebody reads. Its buffer holds one only between its coming and the reader's waking."""
+    """Takes a value when somebody reads. Its buffer holds one only between its coming and the reader's waking.
+
+    `drop` ends a connection, given by its id, whose other side has gone.
+    """
 
     def __init__(
-        self, setup: LinkSetup, condition: threading.Condition, arrivals: Iterator[int], demand: Demand
+        self,
+        setup: LinkSetup,
+        condition: threading.Condition,
+        arrivals: Iterator[int],
+        demand: Demand,
+        drop: Callable[[str], None],
     ) -> None:
         super().__init__(setup, condition, arrivals)
         self._condition: Final = condition
         self._demand: Final = demand
+        self._drop: Final = drop
         self._outlet: ChannelOutlet | None = None
 
     def reach(self, outlet: ChannelOutlet) -> None:
@@ -211,22 +220,28 @@ class ChannelReceiver(PushReceiver):
             return False
         try:
             return self._outlet.is_readable(False)
-        except PeerLostError:
-            return False  # the next read tells of it, and drops the connection
+        except PeerLostError as error:
+            self._lost(error)
+            return False
 
     def ask(self) -> DataPortStatus:
-        """Look for a writer who waits, and take its value. CONNECTION_LOST: it has gone. Never raises."""
+        """Look for a writer who waits, and take its value. CONNECTION_LOST: it has gone, and so has the connection."""
         if self._outlet is None or self.closed:
             return DataPortStatus.PRECONDITION_NOT_MET
         try:
             answer, octets = self._outlet.get()
         except PeerLostError as error:
-            self.lost_sight(error)
+            self._lost(error)
             return DataPortStatus.CONNECTION_LOST
         if answer is not PortStatus.PORT_OK:
             return DataPortStatus.BUFFER_EMPTY
         super().put(octets)
         return DataPortStatus.PORT_OK
+
+    def _lost(self, error: Exception) -> None:
+        if not self.closed:
+            self.lost_sight(error)
+            self._drop(self.info.connector_id)
 
     def _end(self) -> None:
         super()._end()

@@ -212,8 +212,6 @@ class DataInPort(DataPort[T]):
                     break
                 if status is not DataPortStatus.BUFFER_EMPTY:
                     channels.remove(channel)
-                if status is DataPortStatus.CONNECTION_LOST:
-                    self._drop(channel.info.connector_id)
             with self._condition:
                 left = ASK_AGAIN if deadline is None else deadline - self._clock()
                 waits = options.empty_policy is EmptyPolicy.BLOCK and left > 0 and bool(channels)
@@ -290,7 +288,7 @@ class DataInPort(DataPort[T]):
 
     def _channel_link(self, connection: Connection, options: DataOptions) -> Link:
         link = ChannelReceiver(
-            self._setup(connection, options), self._condition, self._arrivals, self._demand
+            self._setup(connection, options), self._condition, self._arrivals, self._demand, self._drop
         )
         transport = TRANSPORTS.duplex[options.interface_type]
         link.offer = transport.offer_inlet(connection, link.put, link.is_writable)
