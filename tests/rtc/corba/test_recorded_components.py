@@ -152,5 +152,5 @@ def test_its_context_and_sets_are_those_of_the_recorded_one(pair: tuple[dict[str
         one.id: texts_of(one.configuration_data)
         for one in reference.get_configuration().get_configuration_sets()
     }
-    told = {one["id"]: texts(one["configuration_data"]) for one in wanted["sdo"]["configuration_sets"]}
-    assert sets == told
+    kept = {one["id"]: texts(one["configuration_data"]) for one in wanted["sdo"]["configuration_sets"]}
+    assert sets == kept
