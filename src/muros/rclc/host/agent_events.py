@@ -19,6 +19,7 @@ from __future__ import annotations
 import struct
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+from muros.client.link import CONNECTED
 from muros.rclc.executor import _NEVER
 from muros.rclc.host.handles import tell_problem
 
@@ -38,7 +39,6 @@ LONGEST_WHY: Final = 400
 """Bytes of words."""
 
 _HEAD = struct.Struct("<5I")
-_CONNECTED = 2
 
 
 class News(NamedTuple):
@@ -110,7 +110,7 @@ class NewsReader:
         self._reader.destroy()
 
     def _waited(self, now: int) -> int:
-        if self._session.state != _CONNECTED or self._session.pending:
+        if self._session.state != CONNECTED or self._session.pending:
             self._since = None
             return 0
         if self._since is None:

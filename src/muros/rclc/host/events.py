@@ -32,8 +32,8 @@ DEADLINE_MISSED, INCOMPATIBLE_QOS, LIVELINESS_LOST, MATCHED, MESSAGE_LOST = NAME
     "matched",
     "message_lost",
 )
-_TOLD = frozenset({INCOMPATIBLE_QOS, LIVELINESS_LOST, MATCHED})
-"""What only an agent knows."""
+COUNTS = {INCOMPATIBLE_QOS: "misfits", LIVELINESS_LOST: "silences", MATCHED: "matched"}
+"""What only a space knows, which an agent may tell, and what the number of it is called there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +127,7 @@ class SessionEvents:
         self._period: int = entity.qos.deadline
         self._clock = node.context.clock
         self._news: NewsReader | None = None
-        if _TOLD.intersection(names):
+        if not COUNTS.keys().isdisjoint(names):
             from muros.rclc.host.agent_events import NewsReader
 
             self._news = NewsReader(node.context, node.participant, entity)
@@ -148,10 +148,7 @@ class SessionEvents:
         if name == DEADLINE_MISSED:
             self._look(now)
             return self._missed
-        news = self._told(now)
-        return (
-            news.matched if name == MATCHED else news.misfits if name == INCOMPATIBLE_QOS else news.silences
-        )
+        return int(getattr(self._told(now), COUNTS[name]))
 
     def current(self) -> int:
         """How many are matched now, as far as the agent tells."""

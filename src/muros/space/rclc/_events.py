@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from muros.rclc.host.events import DEADLINE_MISSED, INCOMPATIBLE_QOS, MATCHED, MESSAGE_LOST
+from muros.rclc.host.events import COUNTS, DEADLINE_MISSED, MESSAGE_LOST
 from muros.space.rclc._counts import EndpointCounts
 
 if TYPE_CHECKING:
@@ -32,9 +32,7 @@ class SpaceEvents:
             return int(self._end.deadline_missed)
         if name == MESSAGE_LOST:
             return int(getattr(self._end, "lost", 0)) + int(getattr(self._owner, "lost", 0))
-        if name == MATCHED:
-            return self._counts.matched
-        return self._counts.misfits if name == INCOMPATIBLE_QOS else self._counts.silences
+        return int(getattr(self._counts, COUNTS[name]))
 
     def current(self) -> int:
         """How many are matched now."""
