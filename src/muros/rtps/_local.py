@@ -132,14 +132,11 @@ class LocalWriter(WriterPort):
         """Samples it had no room for: `write` returned 0."""
         self._instances = _instances(qos.limits if keyed(self.entity) else None)
         self._watched = self._deadlines is not None or qos.liveliness != Liveliness.AUTOMATIC
-        self._inside: tuple[
-            LocalReader, ...
-        ] = ()  # all readers, where they may be given samples by hand; as of:
+        self._inside: tuple[LocalReader, ...] = ()
+        """All readers, where they may be given samples by hand; as of:"""
         self._changes = -1
-        self._inline: tuple[bytes, Parameters | None] = (
-            b"",
-            None,
-        )  # the inline QoS given last, and what it says
+        self._inline: tuple[bytes, Parameters | None] = b"", None
+        """The inline QoS given last, and what it says."""
 
     @property
     def qos(self) -> EndpointQos:

@@ -384,9 +384,8 @@ class ServiceClient(Endpoint):
 
     def on_reply(self, number: int, body: bytes) -> None:
         """An answer for the board. Those to calls that it made before it started again are dropped."""
-        if (
-            self._calling or self.board.output.holds
-        ):  # the call's number, or what the board has, is not known yet
+        # the call's number, or what the board has, is not known yet
+        if self._calling or self.board.output.holds:
             self._early.append((number, body))
             return
         if number not in self._waiting:
