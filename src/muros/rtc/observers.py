@@ -21,8 +21,7 @@ from enum import Enum
 from typing import Final
 
 from muros.findings import Finding, Severity
-from muros.rtc.codes import RtcError
-from muros.rtc.properties import is_yes, split_list
+from muros.rtc.properties import is_yes, seconds_of, split_list
 
 __all__ = ["CAPACITY", "Dialect", "Observer", "ObserverOptions", "Outbox", "StatusKind"]
 
@@ -110,12 +109,12 @@ class ObserverOptions:
         return cls(
             frozenset(kinds),
             {
-                kind: max(_seconds(texts, f"{key}.interval", HEARTBEAT_INTERVAL), LEAST_INTERVAL)
+                kind: max(seconds_of(texts, f"{key}.interval", HEARTBEAT_INTERVAL), LEAST_INTERVAL)
                 for kind, key in _heartbeat_keys(texts, dialect)
                 if is_yes(texts.get(f"{key}.enable", ""))
             },
-            _seconds(texts, "port_profile.send_event.min_interval", DATA_INTERVAL),
-            _seconds(texts, "port_profile.receive_event.min_interval", DATA_INTERVAL),
+            seconds_of(texts, "port_profile.send_event.min_interval", DATA_INTERVAL),
+            seconds_of(texts, "port_profile.receive_event.min_interval", DATA_INTERVAL),
         )
 
 
@@ -293,14 +292,3 @@ def _heartbeat_keys(texts: Mapping[str, str], dialect: Dialect) -> tuple[tuple[S
         (StatusKind.RTC_HEARTBEAT, "rtc_heartbeat" if own else "heartbeat"),
         (StatusKind.EC_HEARTBEAT, "ec_heartbeat"),
     )
-
-
-def _seconds(texts: Mapping[str, str], key: str, default: float) -> float:
-    text = texts.get(key, "").strip()
-    try:
-        seconds = float(text) if text else default
-    except ValueError:
-        seconds = math.nan
-    if not (math.isfinite(seconds) and seconds >= 0):
-        raise RtcError(f"{key}: {text!r} is no time; write seconds, such as {default:g}")
-    return seconds

@@ -9,6 +9,7 @@ comments behind `#` or `!` at the line's start, a backslash at the line's end go
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, MutableMapping
 from pathlib import Path
@@ -19,9 +20,12 @@ from muros.rtc.codes import RtcError
 __all__ = [
     "ConfError",
     "Properties",
+    "flag_of",
     "is_yes",
+    "number_of",
     "read_conf_file",
     "read_conf_untrusted",
+    "seconds_of",
     "split_list",
     "write_conf",
 ]
@@ -70,19 +74,15 @@ class Properties(MutableMapping[str, str]):
 
     def flag(self, name: str, default: bool = False) -> bool:
         """Whether the value is YES (or true, on, 1 in any case); an empty one gives `default`."""
-        text = self.get(name, "").strip()
-        return is_yes(text) if text else default
+        return flag_of(self, name, default)
 
     def number(self, name: str, default: float) -> float:
         """The value as a number; `default` where there is none. ConfError for a text that is none."""
         text = self.get(name, "").strip()
         if not text:
             return default
-        try:
-            number = float(text)
-        except ValueError:
-            number = float("nan")
-        if number != number or number in (float("inf"), float("-inf")):
+        number = number_of(text)
+        if not math.isfinite(number):
             raise ConfError(f"{self._full(name)}: {text!r} is not a number; write one such as {default:g}")
         return number
 
@@ -179,6 +179,29 @@ def split_list(text: str) -> tuple[str, ...]:
 def is_yes(text: str) -> bool:
     """Whether a text of a configuration means yes."""
     return text.strip().lower() in ("yes", "true", "on", "1")
+
+
+def number_of(text: str) -> float:
+    """The number that a text writes; not-a-number for one that writes none."""
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def flag_of(texts: Mapping[str, str], key: str, default: bool) -> bool:
+    """Whether the text of `key` means yes; `default` where there is none."""
+    text = texts.get(key, "").strip()
+    return is_yes(text) if text else default
+
+
+def seconds_of(texts: Mapping[str, str], key: str, default: float) -> float:
+    """The time that the text of `key` writes; `default` where there is none. RtcError for one that is no time."""
+    text = texts.get(key, "").strip()
+    seconds = number_of(text) if text else default
+    if not (math.isfinite(seconds) and seconds >= 0):
+        raise RtcError(f"{key}: {text!r} is no time; write seconds, such as 0.5")
+    return seconds
 
 
 _KEY: Final = re.compile(r"((?:[^\\:= \t\f]|\\.)*)[ \t\f]*[:=]?[ \t\f]*", re.DOTALL)

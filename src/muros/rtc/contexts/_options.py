@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from muros.rtc.codes import RtcError
-from muros.rtc.properties import is_yes, split_list
+from muros.rtc.properties import flag_of, number_of, seconds_of, split_list
 
 __all__ = ["PATIENCE", "RATE", "TRANSITION_TIMEOUT", "ContextOptions", "rate_of"]
 
@@ -63,11 +63,11 @@ class ContextOptions:
         RtcError for a text that cannot be used.
         """
         sync = {
-            ask: _flag(texts, f"sync_{ask}", _flag(texts, "sync_transition", True))
+            ask: flag_of(texts, f"sync_{ask}", flag_of(texts, "sync_transition", True))
             for ask in ("activation", "deactivation", "reset")
         }
-        every = _seconds(texts, "transition_timeout", TRANSITION_TIMEOUT)
-        timeout = {ask: _seconds(texts, f"{ask}_timeout", every) for ask in sync}
+        every = seconds_of(texts, "transition_timeout", TRANSITION_TIMEOUT)
+        timeout = {ask: seconds_of(texts, f"{ask}_timeout", every) for ask in sync}
         policy, priority = _policy(texts.get("scheduling", ""))
         return cls(
             sync_activation=sync["activation"],
@@ -76,11 +76,13 @@ class ContextOptions:
             activation_timeout=timeout["activation"],
             deactivation_timeout=timeout["deactivation"],
             reset_timeout=timeout["reset"],
-            patience=_seconds(texts, "transition_patience", PATIENCE),
+            patience=seconds_of(texts, "transition_patience", PATIENCE),
             catch_up=_whole(texts, "catch_up"),
             cpus=tuple(_cpu(word) for word in split_list(texts.get("cpu_affinity", ""))),
             switch_interval=(
-                _seconds(texts, "switch_interval", 0.0) if texts.get("switch_interval", "").strip() else None
+                seconds_of(texts, "switch_interval", 0.0)
+                if texts.get("switch_interval", "").strip()
+                else None
             ),
             policy=policy,
             priority=priority,
@@ -90,29 +92,10 @@ class ContextOptions:
 def rate_of(texts: Mapping[str, str], default: float = RATE) -> float:
     """The property `rate`. RtcError for one at which no context can run."""
     text = texts.get("rate", "").strip()
-    try:
-        rate = float(text) if text else default
-    except ValueError:
-        rate = math.nan
+    rate = number_of(text) if text else default
     if not (math.isfinite(rate) and rate > 0):
         raise RtcError(f"rate: {text!r} is no rate; write passes per second, such as 1000")
     return rate
-
-
-def _flag(texts: Mapping[str, str], key: str, default: bool) -> bool:
-    text = texts.get(key, "").strip()
-    return is_yes(text) if text else default
-
-
-def _seconds(texts: Mapping[str, str], key: str, default: float) -> float:
-    text = texts.get(key, "").strip()
-    try:
-        seconds = float(text) if text else default
-    except ValueError:
-        seconds = math.nan
-    if not (math.isfinite(seconds) and seconds >= 0):
-        raise RtcError(f"{key}: {text!r} is no time; write seconds, such as 0.5")
-    return seconds
 
 
 def _whole(texts: Mapping[str, str], key: str) -> int:

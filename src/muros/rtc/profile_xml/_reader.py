@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 from typing import Final, NoReturn
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -20,6 +19,7 @@ from muros.rtc.profile_xml._model import (
     ServiceInterfaceProfile,
     ServicePortProfile,
 )
+from muros.rtc.properties import number_of
 
 __all__ = ["ProfileError", "read_profile_file", "read_profile_untrusted"]
 
@@ -181,10 +181,8 @@ def _number(element: Element, name: str, source: str) -> float | None:
     text = _text(element, name)
     if not text:
         return None
-    number = None
-    with contextlib.suppress(ValueError):
-        number = float(text)
-    if number is None or not 0 <= number < 1e12:
+    number = number_of(text)
+    if not 0 <= number < 1e12:
         raise ProfileError(f"{source}: {name} is {text!r}; it is a number from 0 on")
     return number
 
