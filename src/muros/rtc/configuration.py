@@ -225,8 +225,7 @@ class Configuration:
         They come into force by `activate`. False where there is no such set. Raises EmptyIdError, FullError.
         """
         with self._lock:
-            if not given.id:
-                raise EmptyIdError("the id of the configuration set is empty")
+            _check_id(given.id)
             standing = self._sets.get(given.id)
             if standing is None:
                 return False
@@ -241,8 +240,7 @@ class Configuration:
     def add(self, given: ConfigurationSet) -> bool:
         """Add a set; False where one of that id stands. Raises EmptyIdError, FullError."""
         with self._lock:
-            if not given.id:
-                raise EmptyIdError("the id of the configuration set is empty")
+            _check_id(given.id)
             if given.id in self._sets:
                 return False
             self._make_sure_of_room(given)
@@ -255,8 +253,7 @@ class Configuration:
     def remove(self, id_: str) -> bool:
         """Remove a set that was added at run time; False for the active one and all others. Raises EmptyIdError."""
         with self._lock:
-            if not id_:
-                raise EmptyIdError("the id of the configuration set is empty")
+            _check_id(id_)
             if id_ == self._active or id_ not in self._added:
                 return False
             self._added.discard(id_)
@@ -268,8 +265,7 @@ class Configuration:
     def activate(self, id_: str) -> None:
         """Put a set into force: the next `update` takes its values over. Raises EmptyIdError, ActivationError."""
         with self._lock:
-            if not id_:
-                raise EmptyIdError("the id of the configuration set is empty")
+            _check_id(id_)
             if id_.startswith(HIDDEN):
                 raise ActivationError(
                     f"the set {id_!r} is hidden: it holds remarks for editors and cannot be activated"
@@ -329,8 +325,7 @@ class Configuration:
         self._in_force = False
 
     def _known(self, id_: str) -> ConfigurationSet:
-        if not id_:
-            raise EmptyIdError("the id of the configuration set is empty")
+        _check_id(id_)
         if id_ not in self._sets:
             raise UnknownSetError(
                 f"there is no configuration set {id_!r}; there are {', '.join(self._visible())}"
@@ -377,3 +372,8 @@ def converter_of(value: object) -> Callable[[str], Any]:
     raise ConfigurationError(
         f"no conversion for a parameter of type {type(value).__name__}: give one (convert=...) that takes the text"
     )
+
+
+def _check_id(id_: str) -> None:
+    if not id_:
+        raise EmptyIdError("the id of the configuration set is empty")
