@@ -6,18 +6,9 @@ from __future__ import annotations
 import contextlib
 from collections import deque
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any
 
-__all__ = ["CorbaNaming", "bindings"]
-
-CONTEXTS: Final = 1000
-"""Contexts of one server that are looked through; they may be bound in a circle."""
-
-BATCH: Final = 200
-"""Bindings that are asked for at once."""
-
-BINDINGS: Final = 100_000
-"""Bindings that are looked at of one context."""
+__all__ = ["CorbaNaming"]
 
 
 class CorbaNaming:
@@ -101,9 +92,11 @@ class CorbaNaming:
         """What is bound in a context with names of this kind, as `CosNaming.Binding`s; nothing where it is none."""
         import CosNaming
 
+        from muros.rtc.corba._naming import entries_of
+
         with contextlib.suppress(CosNaming.NamingContext.NotFound):
             context = self.resolve(string_name)._narrow(CosNaming.NamingContext)
-            found = () if context is None else bindings(context)
+            found = () if context is None else entries_of(context)
             return [one for one in found if one.binding_name[-1].kind == string_kind]
         return []
 
@@ -112,16 +105,18 @@ class CorbaNaming:
         import CosNaming
         from omniORB import CORBA
 
+        from muros.rtc.corba._naming import WALK_LIMIT, entries_of, is_same
+
         seen, waiting = [self._context], deque([self._context])
         while waiting:
             context = waiting.popleft()
             with contextlib.suppress(CORBA.Exception):
-                for one in bindings(context):
+                for one in entries_of(context):
                     name = one.binding_name[-1]
                     if one.binding_type == CosNaming.ncontext:
                         inner = context.resolve([name])._narrow(CosNaming.NamingContext)
-                        known = inner is None or any(inner._is_equivalent(other) for other in seen)
-                        if not known and len(seen) < CONTEXTS:
+                        known = inner is None or any(is_same(inner, other) for other in seen)
+                        if not known and len(seen) < WALK_LIMIT:
                             seen.append(inner)
                             waiting.append(inner)
                     elif (name.id, name.kind) == (id_, kind):
@@ -152,18 +147,3 @@ class CorbaNaming:
             with contextlib.suppress(CosNaming.NamingContext.AlreadyBound):
                 self._context.bind_new_context(parts[:depth])
         return parts
-
-
-def bindings(context: Any) -> list[Any]:
-    """What is bound in a context, as `CosNaming.Binding`s."""
-    found, more = context.list(BATCH)
-    try:
-        while more is not None and len(found) < BINDINGS:
-            again, some = more.next_n(BATCH)
-            found += some
-            if not again:
-                break
-    finally:
-        if more is not None:
-            more.destroy()
-    return list(found)

@@ -25,7 +25,7 @@ from muros.rtc.codes import PeerLostError, RtcError
 from muros.rtc.corba._lost import LOST, asked_again, describe
 from muros.rtc.corba._orb import Orb
 
-__all__ = ["Binding", "NameServer", "Names", "is_same", "lives", "server_address", "split_path"]
+__all__ = ["Binding", "NameServer", "Names", "entries_of", "is_same", "lives", "server_address", "split_path"]
 
 DEFAULT_PORT: Final = 2809
 """TCP port of a name server whose address has none."""
@@ -177,7 +177,7 @@ class NameServer:
                 return
 
     def _listed(self, path: str, context: Any) -> Sequence[Any]:
-        return self._ask(path, lambda _: _entries(context))
+        return self._ask(path, lambda _: entries_of(context))
 
     def _root(self) -> Any:
         if self._context is None:
@@ -335,16 +335,19 @@ def _inner(context: Any, entry: Any, root: Any) -> Any:
     return inner
 
 
-def _entries(context: Any) -> list[Any]:
-    """What is bound in a context, as the server tells it."""
+def entries_of(context: Any) -> list[Any]:
+    """What is bound in a context, as the server tells it: `CosNaming.Binding`s. CORBA's exceptions if it does not."""
     found, more = context.list(_BATCH)
-    while more is not None and len(found) < LIST_LIMIT:
-        again, some = more.next_n(_BATCH)
-        found += some
-        if not again:
-            break
-    if more is not None:
-        more.destroy()
+    try:
+        while more is not None and len(found) < LIST_LIMIT:
+            again, some = more.next_n(_BATCH)
+            found += some
+            if not again:
+                break
+    finally:
+        if more is not None:
+            with contextlib.suppress(CORBA.Exception):
+                more.destroy()
     return [one for one in found if one.binding_name]
 
 
