@@ -119,9 +119,7 @@ class Properties:
         if node is None:
             return None
         gone = Properties(node)
-        for texts in (node._texts, node._defaults):
-            for key in list(texts):
-                del texts[key]
+        node.clear()
         return gone
 
     def hasKey(self, key: str) -> Properties | None:
