@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from muros.client import Qos
-from muros.rclc import Executor, RclError
+from muros.rclc import Executor, Publisher, RclError
 from muros.rclc.host.context import Context
 from muros.space import CDR_BE, Durability, History, Reliability, Space, Topic, open_space
 from muros.space import Qos as SpaceQos
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 INT32 = "std_msgs::msg::dds_::Int32_"
 NAME: Any = "local:"
+KEEP_ALL = Qos(keep_all=True)
 
 
 @pytest.fixture
@@ -322,19 +323,22 @@ def test_what_is_only_worth_knowing_is_not_printed(space: Space, capsys: pytest.
     context.close()
 
 
-def test_a_full_reader_that_keeps_all_refuses(space: Space) -> None:
-    keep_all = Qos(keep_all=True)
-    talker, listener = Context(space), Context(space)
-    got = listen(listener, qos=keep_all)
-    publisher = talker.node("talker").publisher(Int32, "value", keep_all)
-    problems: list[tuple[int, str]] = []
-    talker.on_problem(lambda code, text: problems.append((code, text)))
+def fill(talker: Context) -> tuple[Publisher, int]:
+    """A publisher for which there is no room any more, and how many were taken: 0, 1, 2 and so on."""
+    publisher = talker.node("talker").publisher(Int32, "value", KEEP_ALL)
     taken = 0
-    while publisher.publish(
-        Int32(data=taken)
-    ):  # as many as the reader and, where there is one, the wire hold
+    while publisher.publish(Int32(data=taken)):  # what the reader and, where there is one, the wire hold
         taken += 1
         assert taken < 100
+    return publisher, taken
+
+
+def test_a_full_reader_that_keeps_all_refuses(space: Space) -> None:
+    talker, listener = Context(space), Context(space)
+    got = listen(listener, qos=KEEP_ALL)
+    problems: list[tuple[int, str]] = []
+    talker.on_problem(lambda code, text: problems.append((code, text)))
+    publisher, taken = fill(talker)
     for _ in range(3):
         publisher.publish(Int32(data=taken))
     assert [code for code, _ in problems] == [8, 8, 8], "the first, the second, the fourth..."
@@ -349,16 +353,11 @@ def test_a_full_reader_that_keeps_all_refuses(space: Space) -> None:
 
 
 def test_who_publishes_may_wait_for_room(space: Space) -> None:
-    keep_all = Qos(keep_all=True)
     talker, listener = Context(space), Context(space)
-    got = listen(listener, qos=keep_all)
-    publisher = talker.node("talker").publisher(Int32, "value", keep_all)
+    got = listen(listener, qos=KEEP_ALL)
     problems: list[tuple[int, str]] = []
     talker.on_problem(lambda code, text: problems.append((code, text)))
-    taken = 0
-    while publisher.publish(Int32(data=taken)):
-        taken += 1
-        assert taken < 100
+    publisher, taken = fill(talker)
     assert not publisher.publish(Int32(data=-1), timeout=0.05)
     assert len(problems) == 2, "both that were not taken are told, once"
     spinning = threading.Thread(target=Executor(listener).spin, daemon=True)
