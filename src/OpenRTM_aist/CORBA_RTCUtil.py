@@ -82,12 +82,9 @@ def get_component_profile(rtc: Any) -> Properties:
 
 def is_existing(rtc: Any) -> bool:
     """Whether its process answers, and knows it."""
-    from omniORB import CORBA
+    from muros.rtc.corba._naming import lives
 
-    try:
-        return rtc is not None and not rtc._non_existent()
-    except CORBA.SystemException:
-        return False
+    return rtc is not None and lives(rtc)
 
 
 def is_alive_in_default_ec(rtc: Any) -> bool:

@@ -34,12 +34,9 @@ class CorbaNaming:
 
     def isAlive(self) -> bool:
         """Whether it answers."""
-        from omniORB import CORBA
+        from muros.rtc.corba._naming import lives
 
-        try:
-            return self._context is not None and not self._context._non_existent()
-        except CORBA.SystemException:
-            return False
+        return self._context is not None and lives(self._context)
 
     def getRootContext(self) -> Any:
         return self._context
