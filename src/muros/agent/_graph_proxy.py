@@ -4,6 +4,7 @@ No such reader is in the data space: it is answered here, with samples as `muros
 one at once and one after changes, several of them together.
 """
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
 from muros.agent._calls import Call
@@ -14,13 +15,18 @@ from muros.xrce.representation import Entity
 if TYPE_CHECKING:
     from muros.agent._core import AgentCore
 
-__all__ = ["TOPIC", "GraphProxy"]
+__all__ = ["TOPIC", "GraphProxy", "gather"]
 
 TOPIC: Final = "muros_graph"
 DELAY: Final = 50
 """Milliseconds in which changes are gathered."""
 PACE: Final = 1000
 """Bytes of the graph for which they are gathered a millisecond longer: large ones take their time."""
+
+
+def gather(core: "AgentCore", said: bytes, tell: Callable[[], object]) -> Call:
+    """Has changes told when those have been gathered that come together; ``said`` is the graph that was told last."""
+    return core.call_at(core.now + DELAY + len(said) // PACE, tell)
 
 
 class GraphProxy(Answered):
@@ -72,7 +78,7 @@ class GraphProxy(Answered):
 
     def _watch(self, event: GraphEvent) -> None:
         if self._call is None and self._core is not None:
-            self._call = self._core.call_at(self._core.now + DELAY + len(self._said) // PACE, self._tell)
+            self._call = gather(self._core, self._said, self._tell)
 
     def _tell(self) -> None:
         self._call = None

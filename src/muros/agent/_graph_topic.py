@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from muros import interfaces
 from muros.agent._calls import Call
-from muros.agent._graph_proxy import DELAY, PACE, GraphProxy
+from muros.agent._graph_proxy import GraphProxy, gather
 from muros.agent._proxies import Proxy, ReaderProxy
 from muros.space import Durability, GraphEvent, Qos, Reliability, Topic
 
@@ -76,11 +76,7 @@ class _Domain:
 
     def _changed(self, event: GraphEvent) -> None:
         if self._call is None:
-            self._gather()
-
-    def _gather(self) -> None:
-        delay = DELAY + len(self._said) // PACE
-        self._call = self._core.call_at(self._core.now + delay, self._publish)
+            self._call = gather(self._core, self._said, self._publish)
 
     def _publish(self) -> None:
         self._call = None
@@ -94,7 +90,7 @@ class _Domain:
         if self._writer.write(graph):
             self._said = graph
         else:
-            self._gather()  # a reader has no room: try again
+            self._call = gather(self._core, self._said, self._publish)  # a reader has no room: try again
 
     def _graph(self) -> bytes:
         """The graph as it is now, serialised."""
