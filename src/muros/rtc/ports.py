@@ -29,11 +29,11 @@ from enum import Enum
 from typing import Final, Protocol
 
 from muros.findings import Finding, Severity
-from muros.rtc.codes import PeerLostError, PortType, ReturnCode
+from muros.rtc.codes import PeerLostError, PortType, ReturnCode, RtcError
 from muros.rtc.listeners import Listeners
 from muros.rtc.profiles import ConnectorProfile, InterfaceProfile, PeerPort, PortProfile
 
-__all__ = ["ConnectEvent", "ConnectEventKind", "Port", "PortOwner"]
+__all__ = ["ConnectEvent", "ConnectEventKind", "Port", "PortOwner", "connect_ports"]
 
 CONNECTION_LIMIT: Final = 1000
 """Connections of one port at most, where neither its configuration nor its kind says otherwise."""
@@ -435,6 +435,21 @@ class Port:
         self, code: str, what: str, why: str = "", remedy: str = "", severity: Severity = Severity.WARNING
     ) -> None:
         self.report(Finding(code, f"port {self.full_name}", what, why, remedy, severity, self.name))
+
+
+def connect_ports(ports: tuple[Port, ...], properties: Mapping[str, str], name: str = "") -> ConnectorProfile:
+    """Connect ports of this process, the first one leading; the profile that they agreed on.
+
+    Without `name` the connection is called after the ports. RtcError where a port refuses; it reports why.
+    """
+    if not ports:
+        raise RtcError("connect needs the ports to connect")
+    names = "_".join(port.name for port in ports)
+    code, profile = ports[0].connect(ConnectorProfile(name or names, "", ports, properties))
+    if code is not _OK:
+        full = " and ".join(port.full_name for port in ports)
+        raise RtcError(f"{full} are not connected: {code.name}; the findings of the ports tell why")
+    return profile
 
 
 @dataclass(slots=True, eq=False)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from muros.rtc.codes import ReturnCode, RtcError
 from muros.rtc.data._port import DIRECT
-from muros.rtc.ports import Port
+from muros.rtc.ports import Port, connect_ports
 from muros.rtc.profiles import ConnectorProfile
 
 __all__ = ["connect"]
@@ -19,13 +18,6 @@ def connect(*ports: Port, options: Mapping[str, object] = {}, name: str = "") ->
     say otherwise, values go straight from port to port (`interface_type` direct, `dataflow_type` push). A single
     port is connected with `interface_type` space. RtcError where a port refuses; it reports why.
     """
-    if not ports:
-        raise RtcError("connect needs the ports to connect")
     texts = {"interface_type": DIRECT, "dataflow_type": "push", "subscription_type": "flush", **options}
     properties = {f"dataport.{key.removeprefix('dataport.')}": str(value) for key, value in texts.items()}
-    names = "_".join(port.name for port in ports)
-    code, profile = ports[0].connect(ConnectorProfile(name or names, "", tuple(ports), properties))
-    if code is not ReturnCode.RTC_OK:
-        full = " and ".join(port.full_name for port in ports)
-        raise RtcError(f"{full} are not connected: {code.name}; the findings of the ports tell why")
-    return profile
+    return connect_ports(ports, properties, name)
