@@ -19,6 +19,7 @@ __all__ = [
     "InvalidReturnError",
     "join_names",
     "return_code_of",
+    "rtc_name_of",
 ]
 
 
@@ -41,8 +42,7 @@ class Action(Enum):
     @property
     def rtc_name(self) -> str:
         """The method's name in the RTC specification: `onExecute` of `on_execute`."""
-        first, *rest = self.value.split("_")
-        return first + "".join(word.capitalize() for word in rest)
+        return rtc_name_of(self.value)
 
 
 ACTIONS: Final = tuple(Action)
@@ -62,6 +62,12 @@ class ComponentEvent(Enum):
     EC_ATTACHED = "EC_ATTACHED"  # the handle
     EC_DETACHED = "EC_DETACHED"  # the handle
     FINALIZED = "FINALIZED"  # nothing
+
+
+def rtc_name_of(name: str) -> str:
+    """A method's name as the RTC specification writes it: `onExecute` of `on_execute`."""
+    first, *rest = name.split("_")
+    return first + "".join(word.capitalize() for word in rest)
 
 
 class InvalidReturnError(RtcError):

@@ -30,6 +30,7 @@ from enum import Enum
 from typing import Any, ClassVar, Final, Literal, TypeAlias
 
 from muros.findings import Finding, Severity
+from muros.rtc.actions import rtc_name_of
 from muros.rtc.codes import RtcError
 from muros.rtc.listeners import Listeners
 
@@ -58,8 +59,7 @@ class FsmAction(Enum):
     @property
     def rtc_name(self) -> str:
         """The method's name in the RTC specification: `onEntry`."""
-        first, *rest = self.value.split("_")
-        return first + "".join(word.capitalize() for word in rest)
+        return rtc_name_of(self.value)
 
 
 class FsmEvent(Enum):
