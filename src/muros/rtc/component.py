@@ -18,11 +18,11 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Protocol, cast, runtime_checkable
 
 from muros.rtc.actions import ActionPoint, ComponentEvent, join_names
-from muros.rtc.codes import LifeCycleState, ReturnCode, RtcError
+from muros.rtc.codes import LifeCycleState, PortType, ReturnCode, RtcError
 from muros.rtc.configuration import Configuration
 from muros.rtc.contexts import inside_callback, make_contexts
 from muros.rtc.listeners import Listeners
@@ -475,14 +475,13 @@ def _sets(properties: Mapping[str, str]) -> dict[str, dict[str, str]]:
 
 def port_configuration(properties: Mapping[str, str], port: Port) -> dict[str, str]:
     """The keys of rtc.conf that are meant for a port: those for all of its kind, then those for its name."""
-    kind = {"DataInPort": "inport", "DataOutPort": "outport"}.get(port.port_type.value, "corba")
-    places: Iterable[str] = (
-        ("port.corba.",) if kind == "corba" else (f"port.{kind}.dataport.", f"port.{kind}.{port.name}.")
-    )
+    places: tuple[str, ...]
+    if port.port_type is PortType.SERVICE:
+        places = ("port.corba.", f"port.corbaport.{port.name}.", f"port.corba.{port.name}.")
+    else:
+        kind = "inport" if port.port_type is PortType.DATA_IN else "outport"
+        places = (f"port.{kind}.dataport.", f"port.{kind}.{port.name}.")
     found: dict[str, str] = {}
-    for place in (
-        *places,
-        *((f"port.corbaport.{port.name}.", f"port.corba.{port.name}.") if kind == "corba" else ()),
-    ):
+    for place in places:
         found.update({key[len(place) :]: text for key, text in properties.items() if key.startswith(place)})
     return found
