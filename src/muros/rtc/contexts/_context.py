@@ -2,7 +2,7 @@
 
 A context takes requests from any thread (start, activate, a new rate, ...) and has them done by its conductor, the one
 thread that runs its callbacks at a time; which thread that is, and when passes run, is what the kinds differ in
-(`_periodic`, `_external`). The lock guards the queue and is never held while anything of a component is called.
+(`_threads`, `_synchronous`). The lock guards the queue and is never held while anything of a component is called.
 """
 
 from __future__ import annotations
