@@ -93,12 +93,12 @@ class Manager:
     def runManager(self, no_block: bool | None = None) -> None:
         """Serve until the end; with `no_block` in a thread, and the process takes leave of others when it ends."""
         if no_block:
-            threading.Thread(target=self._serve, name="OpenRTM_aist.Manager", daemon=True).start()
+            threading.Thread(target=self.join, name="OpenRTM_aist.Manager", daemon=True).start()
             atexit.register(self._close)
             return
         in_main_thread = threading.current_thread() is threading.main_thread()
         with ended_by_signals(self.core.shutdown) if in_main_thread else nullcontext():
-            self._serve()
+            self.join()
 
     def shutdown(self) -> None:
         """Say that the end has come."""
@@ -109,10 +109,6 @@ class Manager:
 
     def join(self) -> None:
         """Wait for the end."""
-        self.core.wait()
-        self._close()
-
-    def _serve(self) -> None:
         self.core.wait()
         self._close()
 
