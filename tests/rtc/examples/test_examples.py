@@ -14,11 +14,8 @@ from omniORB import any
 
 from muros.rtc.corba import Orb, RunningNameServer
 from muros.rtc.corba._world import CorbaWorld
-from muros.rtc.manager._defaults import DEFAULTS
-from muros.rtc.properties import Properties
-from muros.rtc.reports import Reporter
 from tests.dds.domains import free_domain
-from tests.rtc.manager._processes import ENVIRONMENT, Managers, wait_until
+from tests.rtc.manager._processes import ENVIRONMENT, Managers, wait_until, world_beside
 
 VECTORS = Path(__file__).parents[2] / "vectors" / "rtc"
 EXAMPLES = Path(__file__).parents[3] / "examples" / "rtc"
@@ -32,10 +29,8 @@ def managers(tmp_path: Path, name_server: RunningNameServer) -> Iterator[Manager
 
 @pytest.fixture
 def world(orb: Orb, name_server: RunningNameServer) -> Iterator[CorbaWorld]:
-    settings = Properties({"corba.nameservers": name_server.address}, defaults=DEFAULTS)
-    made = CorbaWorld(settings, Reporter())
-    yield made
-    made.close()
+    with world_beside(name_server.address) as made:
+        yield made
 
 
 def run(managers: Managers, file: str, *words: str) -> subprocess.Popen[str]:

@@ -7,9 +7,14 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
+from muros.rtc.corba._world import CorbaWorld
+from muros.rtc.manager._defaults import DEFAULTS
+from muros.rtc.properties import Properties
+from muros.rtc.reports import Reporter
 from tests.rtc.conftest import find_free_port
 
 ENVIRONMENT = {**os.environ, "OMNIORB_CONFIG": os.devnull, "PYTHONUNBUFFERED": "1"}
@@ -110,6 +115,16 @@ class Managers:
         with process.stdout as lines:
             for line in lines:
                 self._said[process.pid].append(line)
+
+
+@contextmanager
+def world_beside(names: str) -> Iterator[CorbaWorld]:
+    """This process's place beside managers whose name server is `names`."""
+    world = CorbaWorld(Properties({"corba.nameservers": names}, defaults=DEFAULTS), Reporter())
+    try:
+        yield world
+    finally:
+        world.close()
 
 
 def wait_until(condition: Callable[[], bool]) -> None:

@@ -18,11 +18,8 @@ from muros.rtc.corba import Orb, RunningNameServer
 from muros.rtc.corba._manager import PeerManager
 from muros.rtc.corba._naming import NameServer, is_same
 from muros.rtc.corba._world import CorbaWorld
-from muros.rtc.manager._defaults import DEFAULTS
-from muros.rtc.properties import Properties
-from muros.rtc.reports import Reporter
 from tests.rtc.conftest import find_free_port
-from tests.rtc.manager._processes import Managers, wait_until
+from tests.rtc.manager._processes import Managers, wait_until, world_beside
 
 VECTORS = Path(__file__).parents[2] / "vectors" / "rtc"
 
@@ -45,10 +42,8 @@ def managers(tmp_path: Path, name_server: RunningNameServer) -> Iterator[Manager
 @pytest.fixture
 def world(orb: Orb, name_server: RunningNameServer) -> Iterator[CorbaWorld]:
     """This process's place beside those of `managers`."""
-    settings = Properties({"corba.nameservers": name_server.address}, defaults=DEFAULTS)
-    made = CorbaWorld(settings, Reporter())
-    yield made
-    made.close()
+    with world_beside(name_server.address) as made:
+        yield made
 
 
 def test_the_properties_that_tools_ask_for_are_those_of_the_captured_manager(
