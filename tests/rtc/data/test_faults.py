@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable
 
 import pytest
 
@@ -19,13 +17,7 @@ from muros.rtc.data import (
     _publishers,
 )
 from tests.rtc.data.kit import Ends, MemoryTransport, Pair, TimedLong, TimedLongType, long
-
-
-def wait_for(ready: Callable[[], bool], seconds: float = 10.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not ready():
-        assert time.monotonic() < deadline, "what was waited for did not happen"
-        time.sleep(0.001)
+from tests.rtc.data.test_behaviour import wait_for
 
 
 class Wire:

@@ -6,8 +6,7 @@ import contextlib
 import json
 import math
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -25,6 +24,7 @@ from muros.rtc.data.space._hall import HALL, Hall
 from muros.rtc.data.space._messages import TYPES, codec_of, default_message
 from muros.rtc.profiles import ConnectorProfile
 from tests.rtc.data.kit import Pair, TimedLong, TimedLongType, long
+from tests.rtc.data.test_behaviour import wait_for
 
 LAYOUTS: dict[str, Any] = json.loads(
     (Path(__file__).parents[2] / "vectors" / "rtc" / "idl_types.json").read_text()
@@ -213,13 +213,6 @@ def join(port: DataPort[Any], **more: str) -> ReturnCode:
     """Connect the port alone."""
     named = {f"dataport.{key.replace('__', '.')}": text for key, text in more.items()}
     return port.connect(ConnectorProfile("space", "", (port,), {**SPACE, **named}))[0]
-
-
-def wait_for(ready: Callable[[], bool], seconds: float = 10.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not ready():
-        assert time.monotonic() < deadline, "what was waited for did not happen"
-        time.sleep(0.001)
 
 
 def test_ports_meet_at_a_topic(both: Pair) -> None:
