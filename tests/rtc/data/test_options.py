@@ -150,3 +150,24 @@ def test_times_beyond_all_reason(pair: Pair) -> None:
     reader.join(10)
     assert answers == [8]
     assert [thread for thread in threading.enumerate() if thread.name.startswith("port out")]
+
+
+def test_a_port_may_be_kept_to_some_interface_types() -> None:
+    pair = Pair()
+    pair.in_.configuration = {"provider_types": "direct, smoke", "consumer_types": "none"}
+    told = pair.in_.profile().properties
+    assert (told["dataport.interface_type"], told["dataport.dataflow_type"]) == ("direct", "push")
+    assert pair.ask({"dataport.interface_type": "corba_cdr"})[0] is ReturnCode.BAD_PARAMETER
+    assert "ask for direct" in pair.findings[-1].why
+    assert (
+        pair.ask({"dataport.interface_type": "direct", "dataport.dataflow_type": "pull"})[0]
+        is ReturnCode.BAD_PARAMETER
+    )
+    assert "ask for another dataflow" in pair.findings[-1].why
+    assert pair.ask({"dataport.interface_type": "direct"})[0] is ReturnCode.RTC_OK
+    pair.out.disconnect_all()
+    pair.in_.configuration = {"provider_types": "all"}
+    pair.out.configuration = {"consumer_types": "corba_cdr"}
+    assert pair.ask({"dataport.interface_type": "direct"})[0] is ReturnCode.BAD_PARAMETER
+    assert pair.ask({"dataport.interface_type": "corba_cdr"})[0] is ReturnCode.RTC_OK
+    pair.out.disconnect_all()

@@ -214,11 +214,11 @@ class DataPort(Port, Generic[T]):
     # ---- inside
 
     def _abilities(self) -> dict[str, str]:
-        known = {DIRECT, *TRANSPORTS.push, *TRANSPORTS.pull, *TRANSPORTS.duplex}
+        ways = self._ways()
         abilities = {
             "dataport.data_type": self.data_type.repository_id,
-            "dataport.interface_type": ",".join(sorted(known)),
-            "dataport.dataflow_type": "push,pull,duplex" if TRANSPORTS.duplex else "push,pull",
+            "dataport.interface_type": ",".join(sorted(set().union(*ways.values()))),
+            "dataport.dataflow_type": ",".join(dataflow.value for dataflow, names in ways.items() if names),
             "dataport.subscription_type": "Any",
             "dataport.marshaling_types": ",".join(marshaling_types(self.data_type)),
             "data_type": self.data_type.repository_id,
@@ -228,22 +228,32 @@ class DataPort(Port, Generic[T]):
             abilities["dataport.io_mode"] = abilities["dataport.subscription_type"]
         return abilities
 
+    def _ways(self) -> dict[Dataflow, set[str]]:
+        """The interface types that can be had, as far as the port's configuration permits them."""
+        known: dict[Dataflow, set[str]] = {
+            Dataflow.PUSH: {DIRECT, *TRANSPORTS.push},
+            Dataflow.PULL: {DIRECT, *TRANSPORTS.pull},
+            Dataflow.DUPLEX: set(TRANSPORTS.duplex),
+        }
+        for dataflow, names in known.items():
+            key = "consumer_types" if dataflow is self.calls else "provider_types"
+            permitted = {name.strip().lower() for name in self.configuration.get(key, "").split(",")} - {""}
+            if permitted and "all" not in permitted:
+                names &= permitted
+        return known
+
     def _understand(self, profile: ConnectorProfile) -> tuple[Connection, DataOptions]:
         """What the profile asks of this side. OptionError for what it cannot be."""
         effective = effective_properties(self.configuration, profile.properties, self.side)
         options = parse_options(effective, self.side)
         self._check_data_types(profile)
         interface = options.interface_type
-        there = {
-            Dataflow.PUSH: {DIRECT, *TRANSPORTS.push},
-            Dataflow.PULL: {DIRECT, *TRANSPORTS.pull},
-            Dataflow.DUPLEX: set(TRANSPORTS.duplex),
-        }[options.dataflow]
+        there = self._ways()[options.dataflow]
         if interface not in there:
             raise OptionError(
                 ReturnCode.BAD_PARAMETER,
                 f"dataport.interface_type: {interface!r} with {options.dataflow.value} is not to be had; "
-                f"ask for one of {', '.join(sorted(there))}",
+                f"ask for {', '.join(sorted(there)) or 'another dataflow'}",
             )
         ways = self._abilities()["dataport.dataflow_type"]
         if options.dataflow is Dataflow.DUPLEX and options.dataflow.value not in ways.split(","):
