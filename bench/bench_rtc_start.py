@@ -53,7 +53,7 @@ manager.close()
 """
 
 PLAIN = """
-import sys, time
+import json, os, sys, time
 from omniORB import CORBA
 import CosNaming
 from rtctree.rtc import RTC, RTC__POA
@@ -63,7 +63,9 @@ poa = orb.resolve_initial_references("RootPOA")
 poa._get_the_POAManager().activate()
 root = orb.string_to_object(f"corbaloc::{sys.argv[1]}/NameService")._narrow(CosNaming.NamingContext)
 root.rebind([CosNaming.NameComponent("Bench0", "rtc")], Plain()._this())
-print("{}", flush=True)
+with open("/proc/self/statm") as file:
+    pages = int(file.read().split()[1])
+print(json.dumps({"plain omniORB, MB": pages * os.sysconf("SC_PAGE_SIZE") / 1e6}), flush=True)
 time.sleep(60)
 """
 
@@ -140,7 +142,7 @@ def main() -> int:
     print(
         f"muros : plain omniORB {statistics.median(times['muros']) / statistics.median(times['plain omniORB']):.2f}"
     )
-    print(f"\n{'of muros':<24}{'median':>12}")
+    print(f"\n{'of muros, and memory':<24}{'median':>12}")
     for stage, values in stages.items():
         print(f"{stage:<24}{statistics.median(values):>12.1f}")
     return 0

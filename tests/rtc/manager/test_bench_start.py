@@ -25,3 +25,4 @@ def test_it_measures_all_stages() -> None:
         <= figures["manager MB"]
         <= figures["component MB"]
     )
+    assert figures["interpreter MB"] < figures["plain omniORB, MB"] < figures["component MB"]
