@@ -130,6 +130,13 @@ def test_wrong_use_is_one_line(line: str, said: str, capsys: pytest.CaptureFixtu
         ("--ros1", {}, {"devices": ["/dev/ttyUSB0"], "tcp": [], "baud": 57600}),
         ("--ros1", {"port": "/dev/ttyACM1", "baud": 115200}, {"devices": ["/dev/ttyACM1"], "baud": 115200}),
         ("--ros1", {"port": "tcp", "tcp_port": 12000}, {"tcp": [12000], "devices": []}),
+        ("--ros1", {"port": "tcp"}, {"tcp": [11411], "devices": []}),
+        ("--ros1", {"port": "tcp", "/rosserial_embeddedlinux/tcp_port": "12002"}, {"tcp": [12002]}),
+        ("--ros1 tcp", {"tcp_port": 12000, "/rosserial_embeddedlinux/tcp_port": 12002}, {"tcp": [12000]}),
+        ("--ros1 tcp 12003", {"tcp_port": 12000}, {"tcp": [12003]}),
+        ("--ros1 tcp _tcp_port:=12004", {"tcp_port": 12000}, {"tcp": [12004]}),
+        ("--ros1 --tcp 5000 tcp", {"tcp_port": 12000}, {"tcp": [12000, 5000]}),
+        ("--ros1 --tcp 5000", {"tcp_port": 12000}, {"tcp": [5000]}),
         ("--ros1 -b 9600 /dev/x", {"port": "/dev/y", "baud": 115200}, {"devices": ["/dev/x"], "baud": 9600}),
     ],
 )

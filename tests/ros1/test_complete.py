@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -214,11 +215,8 @@ def test_the_commands_of_ros1(master: Master) -> None:
             assert board.parameter("~list", int) == [1, 2, 3]
 
 
-def test_ports_and_rates_come_from_the_parameters_of_the_node(
-    master: Master, ros: Peer, tmp_path: Path
-) -> None:
-    ros.do("set_param", name="/serial_node/port", value=str(tmp_path / "ttyACM0"))
-    ros.do("set_param", name="/serial_node/baud", value=115200)
+def banner_of(master: Master) -> str:
+    """What the command says first when it is told nothing."""
     process = subprocess.Popen(
         [sys.executable, "-m", "muros", "rosserial", "--ros1", "--space", "none"],
         env=master.environment,
@@ -228,13 +226,29 @@ def test_ports_and_rates_come_from_the_parameters_of_the_node(
     )
     try:
         assert process.stdout is not None
-        banner = process.stdout.readline()
-        assert str(tmp_path / "ttyACM0") in banner
-        assert "115200" in banner
+        return process.stdout.readline()
     finally:
         process.kill()
         process.communicate()
+
+
+def test_ports_and_rates_come_from_the_parameters_of_the_node(
+    master: Master, ros: Peer, tmp_path: Path
+) -> None:
+    try:
+        ros.do("set_param", name="/serial_node/port", value=str(tmp_path / "ttyACM0"))
+        ros.do("set_param", name="/serial_node/baud", value=115200)
+        banner = banner_of(master)
+        assert str(tmp_path / "ttyACM0") in banner
+        assert "115200" in banner
+        with socket.create_server(("127.0.0.1", 0)) as taken:
+            port = taken.getsockname()[1]
+        ros.do("set_param", name="/serial_node/port", value="tcp")
+        ros.do("set_param", name="/rosserial_embeddedlinux/tcp_port", value=port)
+        assert f":{port}" in banner_of(master)
+    finally:
         ros.do("delete_param", name="/serial_node")
+        ros.do("delete_param", name="/rosserial_embeddedlinux")
 
 
 def test_both_graphs_at_once(master: Master, ros: Peer) -> None:

@@ -694,7 +694,8 @@ def test_a_cable_is_pulled_and_plugged_in_again() -> None:
     board.pull()
     board.boot()
     scene.step(5_000)
-    assert scene.said(BoardLost)[0].text() == "Lost sync with device: board a (cable pulled), kept for 30 s"
+    (lost,) = scene.said(BoardLost)
+    assert lost.text() == "Lost sync with device, restarting: board a (cable pulled), kept for 30 s"
     board.plug()
     assert scene.until(lambda: board.connected) <= 5
     scene.step(400)
@@ -893,6 +894,13 @@ def test_diagnostics_say_how_the_line_is() -> None:
     assert values["checksum errors"] == "0"
     assert values["round trip"] == "1 ms"
     assert values["last sync"].endswith("s ago")
+    assert values["last sync lost"] == "never"
+    board.pull()
+    scene.step(2_000)
+    board.plug()
+    scene.step(2_000)
+    values = {value.key: value.value for value in look()[-1].status[0].values}
+    assert 2.0 <= float(values["last sync lost"].removesuffix(" s ago")) <= 4.0
 
 
 def test_many_boards_live_side_by_side() -> None:
@@ -1255,3 +1263,44 @@ def test_required_topics_are_asked_for_until_the_board_names_them() -> None:
     asks = scene.core.boards[0].asks
     scene.step(5_000)
     assert scene.core.boards[0].asks == asks
+
+
+def test_lines_that_people_search_for_in_logs_of_rosserial_python() -> None:
+    """Each is said at the same occasion, word for word as far as it goes."""
+    scene = Scene()
+    scene.port.up("nobody", scene.now)
+    board = RosLib(scene)
+    chatter = board.publisher("chatter", "std_msgs/String")
+    board.publisher("odd", "std_msgs/String", md5="0" * 32)
+    board.subscriber("led_out", "std_msgs/Byte")
+    board.server("switch", "std_srvs/SetBool")
+    request, _ = board.client("lamp", "std_srvs/SetBool")
+    board.plug()
+    scene.until(lambda: board.connected)
+    scene.step(400)
+    good = frame(chatter, string("good"))
+    board.raw(good[:-1] + bytes([good[-1] ^ 1]) + good[:4] + bytes([good[4] ^ 1]) + good[5:] + good)
+    scene.step(100)
+    board.send(300, b"stray")
+    board.send(request, b"\x01")
+    scene.step(3_000)
+    board.pull()
+    scene.step(10)
+    said = "\n".join([event.text() for event in scene.events] + [told.format() for told in scene.told])
+    for line in (
+        "Requesting topics...",
+        "Note: publish buffer size is 512 bytes",
+        "Note: subscribe buffer size is 512 bytes",
+        "Setup publisher on chatter [std_msgs/String]",
+        "Setup subscriber on led_out [std_msgs/Byte]",
+        "Setup service server on switch [std_srvs/SetBool]",
+        "Setup service client on lamp [std_srvs/SetBool]",
+        "Starting service client, waiting for service 'lamp'",
+        "Creation of publisher failed: ",
+        "wrong checksum for topic id and msg",
+        "Wrong checksum for msg length",
+        "Tried to publish before configured, topic id 300",
+        "Unable to sync with device; possible link problem or link software version mismatch",
+        "Lost sync with device, restarting",
+    ):
+        assert line in said, said

@@ -43,6 +43,8 @@ class Options:
     """None: to be found out."""
     baud_given: bool = False
     tcp: list[int] = field(default_factory=list)
+    tcp_open: bool = False
+    """The first of ``tcp`` was not said, only that it shall be TCP."""
     host: str | None = None
     name: str | None = None
     namespace: str = ""
@@ -196,18 +198,25 @@ def parameters_of(options: Options) -> Callable[[str], Mapping[str, Any]]:
 
 
 def take_settings(options: Options, setting: Callable[[str], Any]) -> None:
-    """What the command line leaves open is in the parameters of the node at a ROS 1 master: port, baud, tcp_port."""
+    """What the command line leaves open is in the parameters of the node at a ROS 1 master: port, baud, tcp_port.
+
+    ``setting`` knows the node's own, and those of the graph by names with a slash in front.
+    """
     baud = setting("baud")
     if baud is not None and not options.baud_given:
         options.baud = _baud(str(baud))
-    if options.devices or options.tcp:
-        return
-    port = str(setting("port") or DEVICE)
-    if port == "tcp":
-        tcp_port = setting("tcp_port")
-        options.tcp.append(TCP_PORT if tcp_port is None else _port(str(tcp_port)))
-    else:
-        options.devices.append(port)
+    if not options.devices and not options.tcp:
+        port = str(setting("port") or DEVICE)
+        if port != "tcp":
+            options.devices.append(port)
+            return
+        options.tcp.append(TCP_PORT)
+        options.tcp_open = True
+    if options.tcp_open:
+        for name in ("tcp_port", "/rosserial_embeddedlinux/tcp_port"):
+            if (tcp_port := setting(name)) is not None:
+                options.tcp[0] = _port(str(tcp_port))
+                break
 
 
 def _classic(words: Sequence[str], options: Options) -> None:
@@ -239,7 +248,9 @@ def _classic(words: Sequence[str], options: Options) -> None:
         else:
             options.remap[key] = value
     if plain and plain[0] == "tcp":
-        options.tcp.append(_port(plain[1]) if len(plain) > 1 else TCP_PORT if tcp_port is None else tcp_port)
+        said = _port(plain[1]) if len(plain) > 1 else tcp_port
+        options.tcp.insert(0, TCP_PORT if said is None else said)
+        options.tcp_open = said is None
         plain = plain[2:]
     elif plain and os.path.sep in plain[0]:
         options.devices.append(plain.pop(0))

@@ -3,12 +3,13 @@
 import subprocess
 import sys
 
+import omniORB
 import pytest
 from omniORB import CORBA
 
 from muros.rtc.codes import RtcError
 from muros.rtc.corba import Orb, current_orb, endpoint_arguments, start_orb
-from muros.rtc.corba._lost import asked_again, describe, peer
+from muros.rtc.corba._lost import asked_again, describe, peer, quick_answer
 from muros.rtc.corba._stubs import RTC__POA, OpenRTM, OpenRTM__POA
 
 
@@ -227,3 +228,13 @@ def _address(orb: Orb, reference: object) -> str:
     octets = bytes.fromhex(orb.to_text(reference)[4:])
     place = octets.index(b"127.0.0.1\0") + 10
     return f"127.0.0.1:{int.from_bytes(octets[place : place + 2], 'little')}"
+
+
+def test_the_time_for_calls_holds_again_behind_a_shorter_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[int] = []
+    monkeypatch.setattr(omniORB, "setClientThreadCallTimeout", given.append)
+    with quick_answer(5.0):
+        with quick_answer():
+            assert given == [5000, 2000]
+        assert given == [5000, 2000, 5000]
+    assert given == [5000, 2000, 5000, 0]

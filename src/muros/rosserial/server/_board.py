@@ -135,6 +135,8 @@ class Board:
         """When it last sent something that only a connected board sends; logs and questions come from others, too."""
         self.last_time: int | None = None
         self.lost_at: int | None = None
+        self.lost_last: int | None = None
+        """When it was lost last, also if it has come back since."""
         self.due: int | None = None
         self.received_bytes = 0
         self.asks = 0
@@ -465,7 +467,7 @@ class Board:
     def _lose(self, reason: str, now: int) -> None:
         if self.node is not None and self.lost_at is None:
             self._told_lost = True
-            self.lost_at = now
+            self.lost_at = self.lost_last = now
             self.tell(BoardLost(self.label, reason, self.core.limits.keep_lost / 1000))
 
     def _forget(self, now: int) -> None:
@@ -582,7 +584,7 @@ class Board:
                 "unknown-topic-id",
                 subject=str(topic_id),
                 what=f"{{n}} message{{s}} of {self.who} on topic id {topic_id} passed over",
-                why="the board has not named that topic",
+                why=f"Tried to publish before configured, topic id {topic_id}: it has not named that topic",
                 remedy="Nothing: the board is asked again",
             )
         if now >= self._asked_at + self.core.limits.ask:

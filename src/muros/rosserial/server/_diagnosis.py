@@ -108,7 +108,7 @@ class Suspicions:
             return  # what comes before the first frame is judged as a whole
         words = (
             "wrong checksum for topic id and msg",
-            "wrong checksum for msg length",
+            "Wrong checksum for msg length",
             "longer than the board's buffer",
             "cut short",
         )
@@ -136,7 +136,8 @@ class Suspicions:
         )
         board.report(
             "no-sync",
-            what=f"Unable to sync with device: {board.who} does not answer",
+            what="Unable to sync with device; possible link problem or link software version mismatch: "
+            f"{board.who} does not answer",
             why=why,
             remedy=remedy,
         )

@@ -357,7 +357,7 @@ class ServiceClient(Endpoint):
             self.board.report(
                 "no-server",
                 subject=self.name,
-                what=f"{self.board.who} waits for an answer of {self.name}",
+                what=f"Starting service client, waiting for service '{self.name}': {self.board.who} has called it",
                 why=f"nobody serves {self.name} [{self.type_name}] now",
                 remedy="Start the service; the board's loop stands still until then",
             )

@@ -119,8 +119,8 @@ class Ros1World:
         return self._wall() if self._simulated is None else self._simulated
 
     def setting(self, node: str, name: str) -> Any:
-        """The parameter ``~name`` of a node, None if it is not set."""
-        return self.parameters.get(f"{node}/{name}")
+        """The parameter ``~name`` of a node, or ``/name`` of the graph; None if it is not set."""
+        return self.parameters.get(name if name.startswith("/") else f"{node}/{name}")
 
     def watch_services(self) -> None:
         """Keeps ``services`` up to date from now on: the master tells of none by itself."""

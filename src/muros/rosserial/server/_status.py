@@ -22,9 +22,9 @@ def status_of(board: Board, now: int) -> tuple[int, str, dict[str, str]]:
     """Level (0 good to 2 bad), a sentence, and figures by name."""
     decoder, output = board.decoder, board.output
     level, text = _TEXTS[board.state]
-    last = "never" if board.last_time is None else f"{(now - board.last_time) / 1000:.1f} s ago"
     values = {
-        "last sync": last,
+        "last sync": _ago(board.last_time, now),
+        "last sync lost": _ago(board.lost_last, now),
         "protocol": {0xFE: "hydro", 0xFF: "groovy"}.get(board.version, "unknown"),
         "frames received": str(decoder.frames),
         "bytes received": str(board.received_bytes),
@@ -43,3 +43,7 @@ def status_of(board: Board, now: int) -> tuple[int, str, dict[str, str]]:
         "subscribe buffer": f"{board.roster.input_buffer} bytes",
     }
     return level, text, values
+
+
+def _ago(at: int | None, now: int) -> str:
+    return "never" if at is None else f"{(now - at) / 1000:.1f} s ago"

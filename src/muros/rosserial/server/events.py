@@ -126,7 +126,7 @@ class BoardLost(Event):
     """A board is silent or its line is gone; its endpoints stay for ``kept`` seconds."""
 
     severity = 2
-    words = "Lost sync with device: board {e.board} ({e.reason}), kept for {e.kept:.0f} s"
+    words = "Lost sync with device, restarting: board {e.board} ({e.reason}), kept for {e.kept:.0f} s"
     reason: str
     kept: float
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Final, TypeVar
@@ -47,12 +48,21 @@ def asked_again(call: Callable[[], T]) -> T:
 
 @contextmanager
 def quick_answer(seconds: float = QUICK_SECONDS) -> Iterator[None]:
-    """Calls of this thread to other processes end after `seconds` at most; what they raise is left as it is."""
-    omniORB.setClientThreadCallTimeout(round(seconds * 1000))
+    """Calls of this thread to other processes end after `seconds` at most; what they raise is left as it is.
+
+    Within another such block its time holds again afterwards.
+    """
+    before: float = getattr(_thread, "seconds", 0.0)
+    _give(seconds)
     try:
         yield
     finally:
-        omniORB.setClientThreadCallTimeout(0)
+        _give(before)
+
+
+def _give(seconds: float) -> None:
+    _thread.seconds = seconds
+    omniORB.setClientThreadCallTimeout(round(seconds * 1000))
 
 
 def is_late(error: BaseException) -> bool:
@@ -77,3 +87,7 @@ def describe(error: BaseException) -> str:
         return f"{name} ({minor.removeprefix(name + '_')})"
     text = getattr(error, "description", "") or ""
     return f"{name}: {text}" if text else name
+
+
+_thread: Final = threading.local()
+"""What the ORB does not tell: the time that calls of a thread have."""

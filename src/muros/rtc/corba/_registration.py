@@ -15,15 +15,15 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import partial
 from typing import Any, Final
 
-import omniORB
 from omniORB import CORBA
 
 from muros.rtc.codes import PeerLostError, RtcError
+from muros.rtc.corba._lost import quick_answer
 from muros.rtc.corba._naming import Names, NameServer, _quoted, is_same, lives, split_path
 from muros.rtc.corba._orb import Orb
 from muros.rtc.reports import Reporter
 
-__all__ = ["Registration", "patience"]
+__all__ = ["Registration"]
 
 NAME_TIMEOUT: Final = 2.0
 """Seconds that one question to a name server may take."""
@@ -68,7 +68,7 @@ class Registration:
 
     def update(self) -> None:
         """Bind what servers lack."""
-        with patience(NAME_TIMEOUT):
+        with quick_answer(NAME_TIMEOUT):
             self._names.update()
             with self._lock:
                 waiting = dict(self._waiting)
@@ -121,7 +121,7 @@ class Registration:
     @contextlib.contextmanager
     def _noted(self, server: NameServer) -> Iterator[None]:
         """Around questions to a server: a silent one is left alone for a while, what it refuses is passed over."""
-        with patience(NAME_TIMEOUT):
+        with quick_answer(NAME_TIMEOUT):
             try:
                 yield
             except PeerLostError:
@@ -134,7 +134,7 @@ class Registration:
 
         def made() -> None:
             begin = time.monotonic()
-            with patience(NAME_TIMEOUT):
+            with quick_answer(NAME_TIMEOUT):
                 change()
             if time.monotonic() - begin >= NAME_TIMEOUT:  # one was silent; which one, only `Names` knows
                 self._silent.update(dict.fromkeys((one.address for one in self.servers), time.monotonic()))
@@ -184,19 +184,3 @@ def _has_gone(reference: Any | None) -> bool:
         return False
     except CORBA.Exception:
         return True
-
-
-@contextlib.contextmanager
-def patience(seconds: float) -> Iterator[None]:
-    """Calls of this thread to other processes take no longer than that, inside the block."""
-    before: float = getattr(_patient, "seconds", 0.0)
-    _patient.seconds = seconds
-    omniORB.setClientThreadCallTimeout(round(seconds * 1000))
-    try:
-        yield
-    finally:
-        _patient.seconds = before
-        omniORB.setClientThreadCallTimeout(round(before * 1000))
-
-
-_patient: Final = threading.local()

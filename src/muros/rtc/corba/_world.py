@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 from muros.rtc.codes import PeerLostError, RtcError
 from muros.rtc.corba._conversion import to_nv_list
-from muros.rtc.corba._lost import QUICK_SECONDS, peer
+from muros.rtc.corba._lost import QUICK_SECONDS, peer, quick_answer
 from muros.rtc.corba._manager import ManagerServant, PeerManager
 from muros.rtc.corba._naming import NameServer
 from muros.rtc.corba._orb import Orb, current_orb, start_orb
 from muros.rtc.corba._organization import ForeignMember
-from muros.rtc.corba._registration import Registration, patience
+from muros.rtc.corba._registration import Registration
 from muros.rtc.corba._setup import set_up
 from muros.rtc.corba._stubs import RTC, RTM
 from muros.rtc.properties import Properties
@@ -116,7 +116,7 @@ class CorbaWorld:
 
     def manager_at(self, address: str) -> PeerManager:
         reference = self.orb.to_reference(_manager_location(address))
-        with peer(f"the manager at {address}"), patience(MANAGER_TIMEOUT):
+        with peer(f"the manager at {address}"), quick_answer(MANAGER_TIMEOUT):
             manager = reference._narrow(RTM.Manager) if reference is not None else None
         if manager is None:
             raise RtcError(f"{address} is no manager")
