@@ -165,8 +165,16 @@ def constants_cost_nothing(module: Module) -> Iterator[Complaint]:
 def classes_are_plain(module: Module) -> Iterator[Complaint]:
     """Rule 5: single inheritance, no metaclass, no attribute hooks, no forwarding of arguments.
 
-    But for one: what an object has not may be lent by a borrowed module, see ``muros.compat``.
+    But for one: what an object has not may be lent by a borrowed module, see ``muros.compat``; that may be what sets
+    it up, once.
     """
+    passing = {
+        call
+        for node in module.nodes
+        if isinstance(node, ast.FunctionDef) and node.name == "__init__"
+        for call in ast.walk(node)
+        if isinstance(call, ast.Call) and ast.unparse(call.func).startswith("borrow(")
+    }
     hooks = {
         "__getattr__",
         "__getattribute__",
@@ -184,9 +192,13 @@ def classes_are_plain(module: Module) -> Iterator[Complaint]:
                     yield Complaint(item.lineno, f"class {node.name} defines {item.name}")
         if module.path == "muros/compat.py":
             continue  # where lending is done
-        if isinstance(node, ast.Call) and (
-            any(isinstance(argument, ast.Starred) for argument in node.args)
-            or any(keyword.arg is None for keyword in node.keywords)
+        if (
+            isinstance(node, ast.Call)
+            and node not in passing
+            and (
+                any(isinstance(argument, ast.Starred) for argument in node.args)
+                or any(keyword.arg is None for keyword in node.keywords)
+            )
         ):
             yield Complaint(node.lineno, "passes * or ** on, which allocates on each call")
 

@@ -132,7 +132,7 @@ def test_numbers_that_cannot_be() -> None:
 def test_objects_have_room_and_an_end() -> None:
     board = Board()
     board.session.counts[1] = 300
-    assert board.session.participant("far").object_id(0) == 300 << 4 | 1
+    assert board.session.participant("far").object_id(1) == 300 << 4 | 1
     settle(board)
     assert board.session.pending == 0
 

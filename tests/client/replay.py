@@ -18,7 +18,7 @@ from muros.client.closing import leave
 from muros.client.link import CONNECTED
 from muros.client.qos import Qos
 from muros.client.raw import Raw
-from muros.client.requests import requests, submit
+from muros.client.requests import submit
 from muros.client.session import Entity
 from muros.xrce import create, create_text
 from muros.xrce._types import Buffer
@@ -251,7 +251,7 @@ class Puppet:
 
     def submit(self, kind: int, flags: int, object_id: int, payload: bytes) -> None:
         """A request."""
-        assert submit(self.session, kind, flags, requests(self.session, 1), object_id, payload)
+        assert submit(self.session, kind, flags, self.session.number(), object_id, payload)
 
     def write(self, stream_id: int, object_id: int, data: bytes) -> None:
         """A sample."""

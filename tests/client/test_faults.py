@@ -42,7 +42,7 @@ def test_every_request_id_may_be_the_first_of_an_entity() -> None:
         made = session.reader(device.participant, "rt/more", STRING)
         device.reader.read(5)
         world.run(100)
-        assert session.pending == session.waiting == 0, f"beginning with request {start}"
+        assert session.pending == len(session.asked) == 0, f"beginning with request {start}"
         assert made.status == 0
     assert not device.problems
 
@@ -54,14 +54,14 @@ def test_an_answer_about_another_object_is_none() -> None:
     late = session.writer(device.participant, "rt/late", STRING)
     world.network.partition(["client"])
     session.spin_once(world.now)
-    status(session, late.request, late.object_id(1), 0x87)
-    status(session, late.request + 3, late.object_id(1), 0x87)
-    assert session.waiting == 3
-    assert late.todo == 0x77
+    status(session, late.request - 3, late.object_id(2), 0x87)
+    status(session, late.request, late.object_id(2), 0x87)
+    assert len(session.asked) == 3
+    assert late.todo == 0b1110
     assert not device.problems
-    status(session, late.request, late.object_id(0), 0)
-    assert session.waiting == 2
-    assert late.todo == 0x66
+    status(session, late.request - 3, late.object_id(3), 0)
+    assert len(session.asked) == 2
+    assert late.todo == 0b0110
 
 
 @pytest.mark.parametrize("queue", [0, 4])
@@ -96,7 +96,7 @@ def test_what_is_written_to_a_refused_writer_is_refused_and_counted() -> None:
     world.start_agent(max_objects=3)
     device = Device(world).connect()
     assert device.writer.status >= 0x80
-    assert device.writer.todo == 0x100
+    assert device.writer.todo == 0x10
     assert not device.writer.write_bytes(b"to nobody")
     assert device.session.drops[0] == 1
     assert [code for code, _ in device.problems][-1] == problem.OFFLINE
@@ -166,7 +166,7 @@ def test_an_on_problem_that_raises_stops_nothing() -> None:
     device.session.on_problem = once(lambda code, text: told.append(code))
     assert run(world, 2000) == 1
     assert told == [problem.ENTITY]
-    assert device.session.pending == device.session.waiting == 0
+    assert device.session.pending == len(device.session.asked) == 0
     assert device.writer.write_bytes(b"still")
     world.run(50)
     assert device.heard == [b"still"]
@@ -180,7 +180,7 @@ def test_an_on_problem_may_destroy_what_was_refused() -> None:
     device.session.on_problem = lambda code, text: device.reader.destroy()
     device.connect()
     world.run(100)
-    assert device.session.pending == device.session.waiting == 0
+    assert device.session.pending == len(device.session.asked) == 0
     assert device.reader not in device.session.entities
 
 

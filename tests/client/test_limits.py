@@ -88,7 +88,7 @@ def test_the_agent_makes_the_qos_that_was_asked_for(creation: str) -> None:
     )
     device.connect()
     (session,) = world.core.clients.values()
-    made: Any = session.objects[writer.object_id(2)]
+    made: Any = session.objects[writer.object_id(1)]
     assert (made.writer.qos.deadline, made.writer.qos.lifespan) == (100_000_000, 2_500_000_000)
     assert made.writer.qos.durability.name == "TRANSIENT_LOCAL"
 

@@ -10,7 +10,6 @@ import pytest
 from muros.client import CONNECTED, CONNECTING, LOST, WAITING, Session
 from muros.client import problems as problem
 from muros.client.raw import Raw
-from muros.client.requests import requests
 from muros.client.session import Entity
 from muros.links.testing import Datagram
 from tests.client.replay import Wire
@@ -157,7 +156,7 @@ def test_many_entities_are_created_a_few_at_a_time() -> None:
 
     def watch(_: int) -> None:
         nonlocal most
-        most = max(most, session.waiting)
+        most = max(most, len(session.asked))
 
     world.run(1500, every=watch)
     assert session.state == CONNECTED
@@ -559,15 +558,15 @@ def test_arguments_are_checked() -> None:
 
 
 def test_keys_are_drawn_and_differ() -> None:
-    assert len({Session(Wire()).notes["key"] for _ in range(20)}) == 20
+    assert len({Session(Wire()).key for _ in range(20)}) == 20
 
 
 def test_request_ids_wrap_to_ten() -> None:
     session = Session(Wire(), 1)
     session.request = 0xFFFE
-    assert [requests(session, 1) for _ in range(3)] == [0xFFFE, 10, 11]
+    assert [session.number() for _ in range(3)] == [0xFFFE, 10, 11]
     session.request = 0xFFFD
-    assert requests(session, 4) == 10
+    assert session.number(4) == 10
 
 
 def test_foreign_bytes_only_move_counters() -> None:

@@ -129,7 +129,7 @@ def test_without_loss_nothing_is_sent_twice() -> None:
     check(1, *run(fleet, parting=False))
     for client in fleet.clients:
         assert client.session.reliable.resends == 0
-        session = fleet.core.clients[client.session.notes["key"]]
+        session = fleet.core.clients[client.session.key]
         assert sum(stream.resends for n, stream in session.outputs.items() if n >= 0x80) == 0
 
 
@@ -167,4 +167,4 @@ def test_clients_that_promised_to_be_lively_are_removed_when_they_vanish() -> No
         client.way.close()
     del fleet.clients[:3]
     fleet.advance(13_000)
-    assert sorted(fleet.core.clients) == [client.session.notes["key"] for client in fleet.clients]
+    assert sorted(fleet.core.clients) == [client.session.key for client in fleet.clients]

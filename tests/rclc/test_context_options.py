@@ -35,7 +35,7 @@ def test_options_of_the_session_that_is_made() -> None:
     session: Any = context.middleware
     assert isinstance(session, Session)
     assert (session.queue, session.reliable.history, session.mtu) == (8, 8, 252)
-    assert session.notes["creation_timeout"] == 500
+    assert session.creation_timeout == 500
     assert session.key == b"\1\2\3\4"
 
 

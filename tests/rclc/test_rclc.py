@@ -87,7 +87,7 @@ def test_names_on_the_wire_are_those_of_ros() -> None:
     assert (writer.name, writer.type_name) == ("rt/greenhouse/temperature", "std_msgs/msg/Int32")
     assert writer.above & 0xFFF == node.participant.id >> 4
     assert node.participant.name == "/greenhouse/thermometer"
-    assert b"std_msgs::msg::dds_::Int32_\0" in variant(writer, 0)
+    assert b"std_msgs::msg::dds_::Int32_\0" in variant(writer, 3)
     absolute: Any = node.publisher(Int32, "/temperature", qos="sensor_data")
     assert absolute.name == "rt/temperature"
     private: Any = node.publisher(Int32, "~/temperature", qos=Qos(depth=1))

@@ -34,7 +34,7 @@ def close(session: "Session") -> None:
             session.deliver(buf, off, n)
 
     transport = session.transport
-    left = session.notes.get("destroy_timeout", _ATTEMPTS * _PATIENCE)  # hosts may set it
+    left = getattr(session, "destroy_timeout", _ATTEMPTS * _PATIENCE)  # hosts may set it
     try:
         while not session.login and session.up:
             leave(session)

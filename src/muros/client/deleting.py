@@ -1,7 +1,7 @@
 """The end of an entity. Boards borrow this."""
 
 from muros.client.entities import object_id, steps
-from muros.client.requests import keep, requests
+from muros.client.requests import keep
 from muros.compat import const
 from muros.xrce.requests import head
 
@@ -12,8 +12,7 @@ if TYPE_CHECKING:
 _DELETE = const(3)
 _LITTLE_ENDIAN = const(0x01)
 _STEPS = const(0x0F)
-_ASKED = const(4)
-_REFUSED = const(0x100)
+_REFUSED = const(0x10)
 
 
 def destroy(entity: "Entity") -> None:
@@ -22,17 +21,15 @@ def destroy(entity: "Entity") -> None:
     if entity not in session.entities:
         return
     session.entities.remove(entity)
-    count = steps(entity)
     if entity.todo & _STEPS:
         session.pending -= 1
-    for step in range(count):
-        if entity.todo >> step + _ASKED & 1:
-            session.waiting -= 1
     entity.todo = _REFUSED
     entity.status = 1
     session.objects.pop(entity.id, None)
     backlog = keep(session)
-    for step in (0, 2, 1) if count == 3 else (0,):
-        data = bytearray(8)
-        head(data, 0, _DELETE, _LITTLE_ENDIAN, 4, requests(session, 1), object_id(entity, step))
-        backlog.items.append(data)
+    for step in (3, 1, 2):
+        if steps(entity) >> step & 1:
+            session.asked.pop(entity.request - step, None)
+            data = bytearray(8)
+            head(data, 0, _DELETE, _LITTLE_ENDIAN, 4, session.number(), object_id(entity, step))
+            backlog.items.append(data)

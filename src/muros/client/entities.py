@@ -1,9 +1,9 @@
 """What is known of entities now and then: the objects that make them up, their end, raw samples, new readings.
 
 A participant is one object; a writer is a topic, a publisher and a datawriter, as the middleware of micro-ROS makes
-them, a reader likewise; a side of a service is one object. Step ``i`` of the creation makes object ``i``; behind the
-last one stands the READ_DATA of those that read. Boards borrow this; functions with ``self`` are methods of
-``session.Entity``.
+them, a reader likewise; a side of a service is one object. The steps of the creation count down: 3 makes the topic, 2
+the publisher or subscriber, 1 the entity itself; 0 is the READ_DATA of those that read. Boards borrow this; functions
+with ``self`` are methods of ``session.Entity``.
 """
 
 from muros.compat import borrow, const
@@ -12,23 +12,31 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.client.session import Entity
 
-_KIND_DATAWRITER = const(5)
-_KIND_DATAREADER = const(6)
+_TOPIC = const(3)
 _PARENT_BITS = const(12)
+_STEPS = b"\0\2\0\0\0\x0e\x0f\3\3"  # by kind of object
 
 UNLIMITED = const(0xFFFF)
 
 
 def steps(entity: "Entity") -> int:
-    """How many objects make it up."""
-    return 3 if entity.id & 15 in (_KIND_DATAWRITER, _KIND_DATAREADER) else 1
+    """The steps of the creation: bit i stands for step i."""
+    return _STEPS[entity.id & 15]
+
+
+def renew(entity: "Entity") -> None:
+    """Everything is to be created, again."""
+    entity.request = 0
+    if entity.status:
+        entity.status = 0
+    entity.todo = steps(entity)
 
 
 def object_id(self: "Entity", step: int) -> int:
-    """The id of an object: ``index << 4 | kind``."""
-    if step == steps(self) - 1:
-        return self.id
-    return self.id - 2 if step else self.above >> _PARENT_BITS
+    """The id of the object that a step makes: ``index << 4 | kind``."""
+    if step == _TOPIC:
+        return self.above >> _PARENT_BITS
+    return self.id + 2 - 2 * step
 
 
 def destroy(self: "Entity") -> None:
@@ -50,10 +58,7 @@ def read(
     one before.
     """
     self.limits = (samples, seconds, bytes_per_second, pace)
-    session = self.session
     if self.todo == 0:
-        session.pending += 1
-        self.request = borrow("muros.client.requests").requests(
-            session, steps(self) + 1
-        )  # the last: READ_DATA
-        self.todo = 1 << steps(self)
+        self.session.pending += 1
+        self.request = 0
+        self.todo = 1

@@ -21,15 +21,14 @@ def hello(session: "Session") -> bytes:
     With ``properties`` the attempt becomes the property ``muros_id``, by which an agent tells a repetition from a new
     beginning. ``hard_liveliness`` in ms, up to 999999, becomes the property ``uxr_hl``.
     """
-    if not session.notes["attempt"]:
-        session.notes["attempt"] = draw(4)
+    if not session.attempt:
+        session.attempt = draw(4)
     properties = []
-    if session.notes["hard_liveliness"]:
-        properties.append(("uxr_hl", "%06d" % session.notes["hard_liveliness"]))
-    if session.notes["properties"]:
-        properties.append(("muros_id", "%02x%02x%02x%02x" % tuple(session.notes["attempt"])))
-    key: bytes = session.notes["key"]
-    body = b"XRCE\1\0\1\x0f" + key + session.head[:1]
+    if session.hard_liveliness:
+        properties.append(("uxr_hl", "%06d" % session.hard_liveliness))
+    if session.properties:
+        properties.append(("muros_id", "%02x%02x%02x%02x" % tuple(session.attempt)))
+    body = b"XRCE\1\0\1\x0f" + session.key + session.head[:1]
     if properties:
         body += b"\1\0\0" + pack("<I", len(properties))
         for pair in properties:
@@ -39,5 +38,5 @@ def hello(session: "Session") -> bytes:
     else:
         body += b"\0"
     body += pack("<H", session.mtu)
-    head = b"\x80\0\0\0" if session.head[0] >= _SESSION_NONE else b"\0\0\0\0" + key
+    head = b"\x80\0\0\0" if session.head[0] >= _SESSION_NONE else b"\0\0\0\0" + session.key
     return head + pack("<BBH", 0, 1, len(body)) + body

@@ -52,6 +52,7 @@ _LEAST = {
     "destroy_timeout": 0,
 }
 """The smallest value of each number among the settings."""
+_OTHERS = {"creation", "reference", "properties"}
 
 _sessions: weakref.WeakSet[Session] = weakref.WeakSet()
 _process = 0
@@ -84,24 +85,18 @@ class Session(board.Session):
         patience = options.pop("destroy_timeout", None)
         super().__init__(transport, client_key, session_id, mtu, history, **options)
         if patience is not None:
-            self.notes["destroy_timeout"] = patience
+            self.destroy_timeout = patience
         _remember(self)
-
-    @property
-    def key(self) -> bytes:
-        """The client key, 4 bytes."""
-        key: bytes = self.notes["key"]
-        return key
 
     def participant(self, name: str, domain: int = 0) -> board.Entity:
         """A DDS participant; see ``methods``."""
         with self._making():
-            return _shared(methods.participant(self, name, domain))
+            return _shared(making.participant(self, name, domain))
 
     def writer(self, node: board.Entity, topic: str, kind: str, qos: AnyQos = "default") -> board.Entity:
         """A writer of ``topic``; see ``methods``."""
         with self._making():
-            return _shared(methods.writer(self, node, topic, kind, qos))
+            return _shared(making.writer(self, node, topic, kind, qos))
 
     def reader(
         self,
@@ -113,25 +108,21 @@ class Session(board.Session):
     ) -> board.Entity:
         """A reader of ``topic``; see ``methods``."""
         with self._making():
-            return _shared(methods.reader(self, node, topic, kind, qos, on_data))
+            return _shared(making.reader(self, node, topic, kind, qos, on_data))
 
     def requester(
         self, node: board.Entity, name: str, kind: str, on_reply: OnReply, qos: AnyQos = "services"
     ) -> Requester:
         """A client of the service ``name``; see ``methods``."""
-        made = Requester(on_reply)
         with self._making():
-            making.service(made, self, node, name, kind, made.KIND, qos)
-        return made
+            return making.enter(Requester(on_reply), self, node, name, kind, qos, Requester.KIND)
 
     def replier(
         self, node: board.Entity, name: str, kind: str, on_request: OnRequest, qos: AnyQos = "services"
     ) -> Replier:
         """A server of the service ``name``; see ``methods``."""
-        made = Replier(on_request)
         with self._making():
-            making.service(made, self, node, name, kind, made.KIND, qos)
-        return made
+            return making.enter(Replier(on_request), self, node, name, kind, qos, Replier.KIND)
 
     def spin_once(self, now: int | None = None) -> int:
         """Does what is due and takes what has come; from any thread. See ``muros.client.session.Session``."""
@@ -218,7 +209,7 @@ class Session(board.Session):
     def index(self, kind: int) -> int:
         """A new index for an object of a kind; when each was used, that of a deleted one. ValueError for none."""
         unused = _unused(self, kind) if self.counts[kind] == _INDICES else None
-        return unused[0] if unused else methods.index(self, kind)
+        return unused[0] if unused else making.index(self, kind)
 
     def attempting(self, now: int) -> None:
         """Tells how long nobody has answered."""
@@ -262,6 +253,9 @@ def _check(
         raise ValueError(f"mtu is {mtu!r}: it must be from {_LEAST_MTU} to {_LARGEST_MTU} bytes")
     if not isinstance(history, int) or history & history - 1 or not 0 < history <= _LARGEST_HISTORY:
         raise ValueError(f"history is {history!r}: it must be a power of two up to {_LARGEST_HISTORY}")
+    unknown = options.keys() - _LEAST.keys() - _OTHERS
+    if unknown:
+        raise TypeError(f"Session has no option {', '.join(sorted(unknown))}")
     creation = options.get("creation", _CREATIONS[0])
     if creation not in _CREATIONS:
         raise ValueError(f"creation is {creation!r}: it must be one of {', '.join(_CREATIONS)}")
@@ -275,7 +269,12 @@ def _check(
 
 def _unused(session: board.Session, kind: int) -> list[int]:
     """The indices that no object of a kind has, nor one whose DELETE is not acknowledged."""
-    used = {entity.object_id(step) for entity in session.entities for step in range(steps(entity))}
+    used = {
+        entity.object_id(step)
+        for entity in session.entities
+        for step in (1, 2, 3)
+        if steps(entity) >> step & 1
+    }
 
     def deleted(buf: Buffer, off: int, n: int) -> None:
         """Takes the DELETEs out of ``n`` bytes of submessages."""

@@ -69,13 +69,13 @@ def turn(session: "Session", now: int) -> None:
     if not session.up and not session.login and session.state != LOST:
         happened(session, _SILENT)
     if session.login:
-        if _is_due(session, now, session.notes["retry"] if session.state == WAITING else _SOON):
+        if _is_due(session, now, session.retry if session.state == WAITING else _SOON):
             _connect(session)
     elif session.state == LOST:
         if _is_due(session, now, _SOON):
             session.ask()
     else:
-        if session.foreign >= _FOREIGN and ticks_diff(now, session.notes["suspected"]) >= _OLDEST:
+        if session.foreign >= _FOREIGN and ticks_diff(now, session.suspected) >= _OLDEST:
             session.foreign = 0
             happened(session, _UNKNOWN)
             session.problem(_PROBLEM_OUT_OF_STEP)
@@ -98,7 +98,7 @@ def deadline(session: "Session", now: int) -> int:
     else:
         left = session.keepalive - ticks_diff(now, session._heard) if session.keepalive else _SLOWLY
     if session.pending:
-        left = min(left, ticks_diff(session.notes["late"], now)) if session.waiting else 0
+        left = min(left, ticks_diff(session.late, now)) if session.asked else 0
     return left
 
 
@@ -132,7 +132,7 @@ def answer(session: "Session", kind: int, buf: "Buffer", off: int, n: int) -> No
     if kind == _STATUS:
         if n >= 6 and buf[off + 2] << 8 | buf[off + 3] == _OBJECT_CLIENT:
             session.login = True  # the agent has taken our leave
-        elif n >= 6 and session.waiting:
+        elif n >= 6 and session.asked:
             borrow("muros.client.creating").status(
                 session, buf[off] << 8 | buf[off + 1], buf[off + 2] << 8 | buf[off + 3], buf[off + 4]
             )
@@ -156,7 +156,7 @@ def stranger(session: "Session", buf: "Buffer", at: int) -> None:
     session.malformed += 1
     session.foreign += 1
     if session.foreign == 1:
-        session.notes["suspected"] = session.now
+        session.suspected = session.now
     if buf[at] == 0 and buf[at + 1] == 0:
         missing = buf[at + 2] << 8 | buf[at + 3]
         probe = session.probe
@@ -164,7 +164,7 @@ def stranger(session: "Session", buf: "Buffer", at: int) -> None:
             _suspect(session)
         elif missing >> probe - 1 & 1 or (probe > 16 and missing == 0):
             session.foreign = _FOREIGN
-            session.notes["suspected"] = ticks_add(session.now, -_OLDEST)
+            session.suspected = ticks_add(session.now, -_OLDEST)
 
 
 def _suspect(session: "Session") -> None:
@@ -173,15 +173,15 @@ def _suspect(session: "Session") -> None:
     An acknowledgement that waits for number 0 may be old. The first of the two is held back until it is asked
     for, so that only an agent which has the second and lacks all before can say that the first is missing.
     """
-    from muros.client.requests import requests, submit
+    from muros.client.requests import submit
 
     stream = session.outputs[_STREAM_RELIABLE]
     stream.flush(session.send, session.now)
     if stream.first and (stream.next - stream.first & 0xFFFF) + 1 < stream.history:
         session.probe = stream.next + 1
-        submit(session, _GET_INFO, _LITTLE_ENDIAN, requests(session, 1), _OBJECT_AGENT, b"\2\0\0\0")
+        submit(session, _GET_INFO, _LITTLE_ENDIAN, session.number(), _OBJECT_AGENT, b"\2\0\0\0")
         stream.flush(_nowhere, session.now)
-    submit(session, _GET_INFO, _LITTLE_ENDIAN, requests(session, 1), _OBJECT_AGENT, b"\2\0\0\0")
+    submit(session, _GET_INFO, _LITTLE_ENDIAN, session.number(), _OBJECT_AGENT, b"\2\0\0\0")
 
 
 def _is_due(session: "Session", now: int, again: int) -> bool:
@@ -215,7 +215,7 @@ def _on_status_agent(session: "Session", status: int) -> None:
         _suspect(session)  # the network repeated our CREATE_CLIENT
     elif status < 0x80:
         session.login = False
-        session.notes["attempt"] = b""
+        session.attempt = b""
         session.foreign = session.probe = 0
         session._heard = session.now
         borrow("muros.client.creating").accepted(session)

@@ -1,86 +1,142 @@
-"""How entities are made: checks, names, ids. What they need at the agent ``creating`` asks for. Boards borrow this."""
+"""What programs make in a session: checks, names, ids. What it needs at the agent ``creating`` asks for.
 
+Boards borrow this; functions with ``self`` are methods of ``session.Session``.
+"""
+
+from muros.client.entities import renew
 from muros.client.names import dds_type, topic_name
 from muros.client.qos import profile, within
 from muros.client.session import Entity
-from muros.compat import const
+from muros.compat import borrow, const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
+    from typing import TypeVar
+
     from muros.client._types import OnData
     from muros.client.qos import AnyQos
+    from muros.client.services import OnReply, OnRequest, Replier, Requester
     from muros.client.session import Session
+    from muros.xrce.streams import Output
+
+    Made = TypeVar("Made", bound=Entity)
 
 _KIND_PARTICIPANT = const(1)
 _KIND_TOPIC = const(2)
+_KIND_DATAWRITER = const(5)
 _KIND_DATAREADER = const(6)
+_KIND_REQUESTER = const(7)
+_KIND_REPLIER = const(8)
 _LAST_DOMAIN = const(255)  # which leaves the choice to the agent; the others end at 232
 _QOS_RELIABLE = const(0x01)
 _PARENT_BITS = const(12)
+_STREAM_BEST_EFFORT = const(0x01)
+_INDICES = const(4096)
 
 
-def participant(session: "Session", name: str, domain: int) -> "Entity":
-    """A participant."""
+def participant(self: "Session", name: str, domain: int = 0) -> Entity:
+    """A DDS participant, the node of ROS. ValueError for a name longer than 59 characters, or for no domain."""
     within("domain", domain, _LAST_DOMAIN)
-    made = _made(Entity(), session, topic_name("", name), _KIND_PARTICIPANT)
+    topic_name("", name)
+    made = Entity()
     made.domain = domain
+    _add(made, self, name, _KIND_PARTICIPANT)
     return made
 
 
-def endpoint(
-    session: "Session",
-    node: "Entity",
-    name: str,
-    type_name: str,
-    qos: "AnyQos",
-    kind: int,
-    on_data: "OnData | None",
-) -> "Entity":
-    """A writer or a reader."""
-    wanted = profile(qos)
-    dds_type(type_name)  # complains now about what cannot be
-    topic = session.index(_KIND_TOPIC) << 4 | _KIND_TOPIC
-    made = _made(Entity(), session, name, kind)
-    made.type_name = type_name
-    made.qos = wanted
-    made.above = topic << _PARENT_BITS | node.id >> 4
-    if kind == _KIND_DATAREADER:
-        session.objects[made.id] = on_data if hasattr(on_data, "deliver") else made
-        if session.objects[made.id] is made:
-            made.deliver = on_data
+def writer(self: "Session", node: Entity, topic: str, kind: str, qos: "AnyQos" = "default") -> Entity:
+    """A writer of ``topic`` with messages of a type, named as in ROS or in DDS. ``publish(message)`` sends."""
+    return enter(Entity(), self, node, topic, kind, qos, _KIND_DATAWRITER)
+
+
+def reader(
+    self: "Session",
+    node: Entity,
+    topic: str,
+    kind: str,
+    qos: "AnyQos" = "default",
+    on_data: "OnData | None" = None,
+) -> Entity:
+    """A reader of ``topic``; ``on_data(buf, off, n)`` gets each sample, whose bytes are only lent.
+
+    An object that has a method ``deliver`` may stand in place of the function.
+    """
+    made = enter(Entity(), self, node, topic, kind, qos, _KIND_DATAREADER)
+    if hasattr(on_data, "deliver"):
+        self.objects[made.id] = on_data
     else:
-        made.stream = session.output(wanted.flags & _QOS_RELIABLE)
+        made.deliver = on_data
     return made
 
 
-def service(
-    made: "Entity",
-    session: "Session",
-    node: "Entity",
-    name: str,
-    type_name: str,
-    kind: int,
-    qos: "AnyQos",
-) -> None:
-    """A side of a service. The names of topics and types in DDS are those that ROS gives them."""
-    wanted = profile(qos)
-    dds_type(type_name, "_Response")  # complains now about what cannot be
-    topic_name("rq", name, "Request")
-    _made(made, session, name, kind)
+def requester(
+    self: "Session", node: Entity, name: str, kind: str, on_reply: "OnReply", qos: "AnyQos" = "services"
+) -> "Requester":
+    """A client of the service ``name``; ``on_reply(number, buf, off, n)`` gets replies, see ``services``."""
+    from muros.client.services import Requester
+
+    return enter(Requester(on_reply), self, node, name, kind, qos, _KIND_REQUESTER)
+
+
+def replier(
+    self: "Session", node: Entity, name: str, kind: str, on_request: "OnRequest", qos: "AnyQos" = "services"
+) -> "Replier":
+    """A server of the service ``name``; ``on_request(identity, buf, off, n)`` gets requests, see ``services``."""
+    from muros.client.services import Replier
+
+    return enter(Replier(on_request), self, node, name, kind, qos, _KIND_REPLIER)
+
+
+def output(self: "Session", reliable: int) -> "Output":
+    """The stream to write to; the one for best effort is made at the first need."""
+    if reliable:
+        return self.reliable
+    if _STREAM_BEST_EFFORT not in self.outputs:
+        self.outputs[_STREAM_BEST_EFFORT] = borrow("muros.xrce.outputs").make(
+            _STREAM_BEST_EFFORT, self.mtu, self.head
+        )
+    stream: "Output" = self.outputs[_STREAM_BEST_EFFORT]
+    return stream
+
+
+def index(self: "Session", kind: int) -> int:
+    """A new index for an object of a kind. ValueError after the last; hosts use those of deleted objects again."""
+    index = self.counts[kind]
+    if index == _INDICES:
+        raise ValueError("no room for one more: a session has at most 4096 objects of a kind")
+    self.counts[kind] = index + 1
+    return index
+
+
+def enter(
+    made: "Made", session: "Session", node: Entity, name: str, type_name: str, qos: "AnyQos", kind: int
+) -> "Made":
+    """Makes a writer, a reader or a side of a service, whose names in DDS are those that ROS gives it, of ``made``.
+
+    What cannot be is complained about now, not when the agent is asked for it.
+    """
+    made.qos = profile(qos)
     made.type_name = type_name
-    made.qos = wanted
     made.above = node.id >> 4
-    made.stream = session.output(wanted.flags & _QOS_RELIABLE)
-    session.objects[made.id] = made
+    if kind > _KIND_DATAREADER:
+        dds_type(type_name, "_Response")
+        topic_name("rq", name, "Request")
+    else:
+        dds_type(type_name)
+        made.above |= (session.index(_KIND_TOPIC) << 4 | _KIND_TOPIC) << _PARENT_BITS
+    if kind != _KIND_DATAREADER:
+        made.stream = output(session, made.qos.flags & _QOS_RELIABLE)
+    _add(made, session, name, kind)
+    if kind != _KIND_DATAWRITER:
+        session.objects[made.id] = made
+    return made
 
 
-def _made(made: "Entity", session: "Session", name: str, kind: int) -> "Entity":
+def _add(made: Entity, session: "Session", name: str, kind: int) -> None:
     """Has an entity created, now or when the session is connected."""
     made.session = session
     made.name = name
     made.id = session.index(kind) << 4 | kind
-    made.todo = (1 << (3 if kind in (5, 6) else 1) + (kind > 5)) - 1
-    made.request = 0
+    renew(made)
     session.entities.append(made)
     session.pending += 1
-    return made

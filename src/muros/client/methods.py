@@ -1,6 +1,6 @@
-"""What programs and entities ask of a session now and then: to make something, to wait for an answer, to end.
+"""What programs and entities ask of a session now and then: to wait for an answer, to keep a sample, to end.
 
-Boards borrow this; its functions are methods of ``session.Session``.
+Boards borrow this; its functions are methods of ``session.Session``, and so are those of ``making``.
 """
 
 from muros.compat import borrow, const, ticks_ms
@@ -10,18 +10,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from muros.client._types import OnData, Outgoing
-    from muros.client.qos import AnyQos
-    from muros.client.services import OnReply, OnRequest, Replier, Requester
-    from muros.client.session import Entity, Session
+    from muros.client._types import Outgoing
+    from muros.client.session import Session
     from muros.xrce._types import Buffer
-    from muros.xrce.streams import Input, Output
+    from muros.xrce.streams import Input
 
 _STREAM_BEST_EFFORT = const(0x01)
-_KIND_DATAWRITER = const(5)
-_KIND_DATAREADER = const(6)
-_KIND_REQUESTER = const(7)
-_KIND_REPLIER = const(8)
 _CONNECTED = const(2)
 _OFFLINE = const(0)
 _FULL = const(1)
@@ -31,61 +25,6 @@ _PROBLEM_OFFLINE = const(7)
 _PROBLEM_FULL = const(8)
 _PROBLEM_UNREACHABLE = const(9)
 _PROBLEM_LARGEST = const(10)
-_INDICES = const(4096)
-
-
-def participant(self: "Session", name: str, domain: int = 0) -> "Entity":
-    """A DDS participant, the node of ROS. ValueError for a name longer than 59 characters, or for no domain."""
-    made: "Entity" = borrow("muros.client.making").participant(self, name, domain)
-    return made
-
-
-def writer(self: "Session", node: "Entity", topic: str, kind: str, qos: "AnyQos" = "default") -> "Entity":
-    """A writer of ``topic`` with messages of a type, named as in ROS or in DDS. ``publish(message)`` sends."""
-    made: "Entity" = borrow("muros.client.making").endpoint(
-        self, node, topic, kind, qos, _KIND_DATAWRITER, None
-    )
-    return made
-
-
-def reader(
-    self: "Session",
-    node: "Entity",
-    topic: str,
-    kind: str,
-    qos: "AnyQos" = "default",
-    on_data: "OnData | None" = None,
-) -> "Entity":
-    """A reader of ``topic``; ``on_data(buf, off, n)`` gets each sample, whose bytes are only lent.
-
-    An object that has a method ``deliver`` may stand in place of the function.
-    """
-    made: "Entity" = borrow("muros.client.making").endpoint(
-        self, node, topic, kind, qos, _KIND_DATAREADER, on_data
-    )
-    return made
-
-
-def requester(
-    self: "Session", node: "Entity", name: str, kind: str, on_reply: "OnReply", qos: "AnyQos" = "services"
-) -> "Requester":
-    """A client of the service ``name``; ``on_reply(number, buf, off, n)`` gets replies, see ``services``."""
-    from muros.client.services import Requester
-
-    made = Requester(on_reply)
-    borrow("muros.client.making").service(made, self, node, name, kind, _KIND_REQUESTER, qos)
-    return made
-
-
-def replier(
-    self: "Session", node: "Entity", name: str, kind: str, on_request: "OnRequest", qos: "AnyQos" = "services"
-) -> "Replier":
-    """A server of the service ``name``; ``on_request(identity, buf, off, n)`` gets requests, see ``services``."""
-    from muros.client.services import Replier
-
-    made = Replier(on_request)
-    borrow("muros.client.making").service(made, self, node, name, kind, _KIND_REPLIER, qos)
-    return made
 
 
 def ping(self: "Session", timeout: int = 1000, clock: "Callable[[], int]" = ticks_ms) -> bool:
@@ -99,16 +38,6 @@ def close(self: "Session") -> None:
     borrow("muros.client.closing").close(self)
 
 
-def output(self: "Session", reliable: int) -> "Output":
-    """The stream to write to; the one for best effort is made at the first need."""
-    if not reliable and _STREAM_BEST_EFFORT not in self.outputs:
-        self.outputs[_STREAM_BEST_EFFORT] = borrow("muros.xrce.outputs").make(
-            _STREAM_BEST_EFFORT, self.mtu, self.head
-        )
-    stream: "Output" = self.reliable if reliable else self.outputs[_STREAM_BEST_EFFORT]
-    return stream
-
-
 def make_input(self: "Session", stream_id: int) -> "Input | None":
     """The stream for best effort is made when something comes on it; there are no others."""
     if stream_id != _STREAM_BEST_EFFORT:
@@ -116,15 +45,6 @@ def make_input(self: "Session", stream_id: int) -> "Input | None":
     made: "Input" = borrow("muros.xrce.inputs").make(stream_id)
     self.inputs[stream_id] = made
     return made
-
-
-def index(self: "Session", kind: int) -> int:
-    """A new index for an object of a kind. ValueError after the last; hosts use those of deleted objects again."""
-    index = self.counts[kind]
-    if index == _INDICES:
-        raise ValueError("no room for one more: a session has at most 4096 objects of a kind")
-    self.counts[kind] = index + 1
-    return index
 
 
 def defer(self: "Session", writer: "Any", message: "Outgoing", n: int) -> bool:
@@ -175,3 +95,7 @@ def gone(self: "Session", error: OSError) -> None:
 
 def attempting(self: "Session", now: int) -> None:
     """An attempt to reach the agent is made; hosts have more to say about it."""
+
+
+def __getattr__(name: str) -> "Any":
+    return getattr(borrow("muros.client.making"), name)

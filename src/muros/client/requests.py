@@ -8,17 +8,6 @@ if TYPE_CHECKING:
     from muros.client.backlog import Backlog
     from muros.client.session import Session
 
-_FIRST_REQUEST = const(10)
-
-
-def requests(self: "Session", count: int) -> int:
-    """The first of ``count`` request ids in a row."""
-    first = self.request
-    if first + count > 0xFFFF:
-        first = _FIRST_REQUEST
-    self.request = first + count
-    return first
-
 
 def submit(
     self: "Session", kind: int, flags: int, request: int, object_id: int, payload: "bytes | bytearray"

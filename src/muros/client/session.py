@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any, Unpack
 
-    from muros.client import entities, methods
+    from muros.client import entities, making, methods
     from muros.client._types import OnData, Options, Outgoing, Transport
     from muros.client.backlog import Backlog
     from muros.client.qos import Qos
@@ -79,11 +79,20 @@ class Session(SessionCore):
         objects: "dict[int, Any]"  # what takes DATA, by object id; what takes other submessages, by minus their kind
         entities: "list[Entity]"
         pending: int  # entities that are not whole yet
-        waiting: int  # requests without a STATUS
+        asked: "dict[int, Entity]"  # by the ids of requests that have no STATUS yet
+        late: int  # the tick at which they are made again
+        laps: int  # how often that was in vain
         counts: "array[int]"  # the next index for each kind of object
-        notes: "dict[str, Any]"  # settings and whatever else only the guide needs
+        key: bytes
+        attempt: bytes  # what names the attempt to connect
+        suspected: int  # the tick since which the agent seems to be out of step
+        create: "Any"  # makes representations that are not binary
         trouble: "tuple[str, int | None] | None"  # what was told that keeps us from the agent
         queue: int
+        properties: bool
+        hard_liveliness: int
+        retry: int
+        creation_timeout: int
         keepalive: int
         ping_timeout: int
         ping_attempts: int
@@ -93,39 +102,42 @@ class Session(SessionCore):
         _tries: int
         _ping: int  # the request id of the question that is open
 
-        participant = methods.participant
-        writer = methods.writer
-        reader = methods.reader
-        requester = methods.requester
-        replier = methods.replier
+        participant = making.participant
+        writer = making.writer
+        reader = making.reader
+        requester = making.requester
+        replier = making.replier
         ping = methods.ping
         close = methods.close
-        output = methods.output
-        index = methods.index
+        index = making.index
+        output = making.output
         make_input = methods.make_input
         too_long = methods.too_long
         dropped = methods.dropped
         problem = methods.problem
         stranger = methods.stranger
         defer = methods.defer
-        attempting = methods.attempting
         gone = methods.gone
+        attempting = methods.attempting
+
+        def __init__(
+            self,
+            transport: "Transport",
+            client_key: "int | bytes | None" = None,
+            session_id: int = 0x81,
+            mtu: int = 0,
+            history: int = 4,
+            **options: "Unpack[Options]",
+        ) -> None:
+            pass
     else:
+
+        def __init__(self, *given, **options):
+            borrow("muros.client.start").start(self, *given, **options)
+            release()
 
         def __getattr__(self, name):
             return lend(self, "muros.client.methods", name)
-
-    def __init__(
-        self,
-        transport: "Transport",
-        client_key: "int | bytes | None" = None,
-        session_id: int = 0x81,
-        mtu: int = 0,
-        history: int = 4,
-        **options: "Unpack[Options]",
-    ) -> None:
-        borrow("muros.client.start").start(self, transport, client_key, session_id, mtu, history, options)
-        release()
 
     def spin_once(self, now: "int | None" = None) -> int:
         """Takes what has come and does what is due; returns the number of messages taken. Never waits.
@@ -175,12 +187,12 @@ class Session(SessionCore):
         pack_into(">HHI", buf, _CONTROL + 4, self._ping, _OBJECT_AGENT, 0x02000000)
         self.send(buf, _CONTROL - len(self.head), len(self.head) + 12)
 
-    def number(self) -> int:
-        """A request id."""
+    def number(self, count: int = 1) -> int:
+        """A request id, the first of ``count`` in a row."""
         request = self.request
-        if request == 0xFFFF:
+        if request + count > 0xFFFF:
             request = _FIRST_REQUEST
-        self.request = request + 1
+        self.request = request + count
         return request
 
     def wait(self, timeout: int) -> None:
@@ -248,8 +260,8 @@ class Entity:
         session: Session
         name: str
         id: int  # of its last object: index << 4 | kind
-        todo: int  # bit i: step i has no good STATUS yet; bit 4 + i: its request is under way; bit 8: refused
-        request: int  # the id of the first request, one more for each step
+        todo: int  # bit i: step i has no good STATUS yet; bit 4: refused
+        request: int  # the id of the request of step 0; those of the other steps come before it
         type_name: str
         qos: "Qos"
         above: int  # the topic's id << 12 | the participant's index
