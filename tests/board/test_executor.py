@@ -482,7 +482,7 @@ def test_let_answers_and_requests_leave_at_the_end() -> None:
     assert bench.heard == []
     bench.session.spin_once(bench.way.now)
     assert sorted(bench.written()) == [6, 7]
-    asked = list(client._asked)
+    asked = [one[0] for one in client._asked]
     assert len(asked) == 1
     client.deliver(asked[0], bytes((9, 0, 0, 0)), 0, 4)
     executor.spin_one_period()

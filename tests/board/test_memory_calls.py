@@ -111,7 +111,7 @@ def test_responses() -> None:
     answers: "list[Any]" = []
     for count in (1, 2):
         assert client.send(Question(), answers.append, 5)
-        (number,) = client._asked
+        number = client._asked[0][0]
         head = bytes((number >> 8, number & 255, 0, 0))
         rig.hear(client.entity.id, head + bytes((count, 0, 0, 0)) + text("a") * count)
     assert len(answers) == 1

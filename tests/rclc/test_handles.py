@@ -123,7 +123,7 @@ def test_what_is_destroyed_keeps_nothing() -> None:
     assert service._waiting == service._answers == []
     assert not service.ready(served.world.now)
     client.destroy()
-    assert client._asked == {}
+    assert client._asked == []
     assert not client.send(AddTwoInts.Request(), served.got.append)
     assert client.call(AddTwoInts.Request(), 0.1) is None
     service.destroy()

@@ -27,10 +27,9 @@ class Client(Handle):
         wait_for_service = handles.wait_for_service
 
     def __init__(self, context: "Context", kind: "Any") -> None:
-        super().__init__(context)
+        self.context = context
         self._kind = kind
-        self._asked: "dict[int, tuple[Any, int]]" = {}  # number: (on_reply, deadline)
-        self._waiting: "list[tuple[Any, Any]]" = []
+        self._asked: "list[list[Any]]" = []  # number, on_reply, deadline, None; 0 and the response once it is there
 
     def send(self, request: "Any", on_reply: "Callable[[Any], object]", timeout: float = _TIMEOUT) -> bool:
         """Sends a request; an executor calls ``on_reply(response)``, with None after ``timeout`` seconds.
@@ -40,43 +39,32 @@ class Client(Handle):
         number = self.entity.send(request)
         if not number:
             return False
-        self._asked[number] = (on_reply, ticks_add(self.context.clock(), int(timeout * 1000)))
+        end = ticks_add(self.context.clock(), int(timeout * 1000))
+        self._asked.append([number, on_reply, end, None])
         return True
 
     def deliver(self, number: int, buf: "Buffer", off: int, n: int) -> None:
-        """Takes a reply of the middleware."""
-        asked = self._asked.get(number)
-        if asked is None:
-            return  # it came too late, or twice
-        response = self._kind.Response()
-        try:
-            response.read(buf, off, n)
-        except ValueError:
-            self.malformed += 1
-            return
-        del self._asked[number]
-        self._waiting.append((asked[0], response))
-
-    def ready(self, now: int) -> bool:
-        """Whether a reply waits, or a request is too old."""
-        return len(self._waiting) > 0 or self.left(now) == 0
+        """Takes a reply of the middleware; one that came too late is for nothing that is asked."""
+        for asked in self._asked:
+            if asked[0] == number:
+                response = self._kind.Response()
+                try:
+                    response.read(buf, off, n)
+                    asked[0], asked[3] = 0, response
+                except ValueError:
+                    self.malformed += 1
 
     def run(self, now: int) -> None:
-        """Hands on a reply, or ends the wait for a request that is too old."""
-        if self._waiting:
-            on_reply, response = self._waiting.pop(0)
-            on_reply(response)
-            return
-        for number in self._asked:
-            on_reply, end = self._asked[number]
-            if ticks_diff(end, now) <= 0:
-                del self._asked[number]
-                on_reply(None)
+        """Hands on the first reply, or ends the wait for a request that is too old."""
+        for asked in self._asked:
+            if asked[0] == 0 or ticks_diff(asked[2], now) <= 0:
+                self._asked.remove(asked)
+                asked[1](asked[3])
                 return
 
     def left(self, now: int) -> int:
-        """Milliseconds until the first request is too old."""
+        """Milliseconds until a request is too old; none when a reply is there."""
         left = _NEVER
-        for number in self._asked:
-            left = min(left, max(ticks_diff(self._asked[number][1], now), 0))
+        for asked in self._asked:
+            left = min(left, max(ticks_diff(asked[2], now), 0) if asked[0] else 0)
         return left

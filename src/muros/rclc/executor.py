@@ -80,18 +80,18 @@ class Executor:
 
     def round(self, timeout: int) -> bool:
         """``spin_some`` with ``timeout`` in ms; allocates nothing."""
-        middleware = self.context.middleware
-        now = self.context.clock()
+        context = self.context
+        now = context.clock()
         end = ticks_add(now, timeout)
         while not self.work(now):
             left = ticks_diff(end, now)
-            if left <= 0 or not self.context.running:
+            if left <= 0 or not context.running:
                 return False
-            left = min(left, middleware.deadline(now))
+            left = min(left, context.middleware.deadline(now))
             for handle in self.handles:
                 left = min(left, handle.left(now))
-            middleware.wait(left)
-            now = self.context.clock()
+            context.middleware.wait(max(left, 1))  # a trigger lets what is ready wait
+            now = context.clock()
         return True
 
     def work(self, now: int) -> bool:
@@ -117,7 +117,6 @@ class Handle:
     if TYPE_CHECKING:
         cancelled: bool
         depth: int
-        home: "list[Any]"  # what its node has made; on hosts
 
         def destroy(self) -> None:
             """Takes it away, with all that waits."""
@@ -129,6 +128,10 @@ class Handle:
     def __init__(self, context: "Context") -> None:
         self.context = context
         context.handles.append(self)
+
+    def ready(self, now: int) -> bool:
+        """Whether there is something to run."""
+        return self.left(now) == 0
 
     def left(self, now: int) -> int:
         """Milliseconds until it is ready of its own accord: it never is."""

@@ -1,4 +1,4 @@
-"""The error about handles that an executor cannot run, or does not have."""
+"""The error about handles that an executor cannot run, or does not have. Boards borrow this."""
 
 from muros.compat import const
 from muros.rclc.errors import CapacityError, RclError
@@ -17,20 +17,22 @@ class HandleError(RclError):
     code = _INVALID_ARGUMENT
 
 
-def refuse(executor: "Executor", handle: object) -> None:
-    """Raises the error about a handle that cannot be added."""
+def check_new(executor: "Executor", handle: object) -> None:
+    """Raises HandleError for a handle that cannot be added, CapacityError when there is no room."""
     if getattr(handle, "context", None) is not executor.context:
         raise HandleError("%r is no handle of this executor's context" % (handle,))
     if handle in executor.handles:
         raise HandleError("%r was added already: an executor runs each handle once" % (handle,))
-    raise CapacityError(
-        "executor is full: %d handles of %d in use. Create it with handles=%d."
-        % (executor.capacity, executor.capacity, executor.capacity + 1)
-    )
+    if 0 < executor.capacity <= len(executor.handles):
+        raise CapacityError(
+            "executor is full: %d handles of %d in use. Create it with handles=%d."
+            % (executor.capacity, executor.capacity, executor.capacity + 1)
+        )
 
 
-def absent(handle: object) -> None:
-    """Raises the error about a handle that is not there."""
-    error = HandleError("%r is not in this executor" % (handle,))
-    error.code = _ERROR
-    raise error
+def check_there(executor: "Executor", handle: object) -> None:
+    """Raises HandleError for a handle that is not there."""
+    if handle not in executor.handles:
+        error = HandleError("%r is not in this executor" % (handle,))
+        error.code = _ERROR
+        raise error

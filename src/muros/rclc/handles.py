@@ -36,20 +36,11 @@ def add(
     """
     if self.handles is self.context.handles:
         self.handles = []
-    if (
-        getattr(handle, "context", None) is not self.context
-        or handle in self.handles
-        or 0 < self.capacity <= len(self.handles)
-    ):
-        from muros.rclc.handle_error import refuse
-
-        refuse(self, handle)
+    borrow("muros.rclc.handle_error").check_new(self, handle)
     handle.eager = self.trigger is None
     if when or hasattr(self, "let"):
         borrow("muros.rclc.periods").prepare(self, handle, when, let, messages)
-    others = handle.handles or self.context.handles
-    if handle in others:
-        others.remove(handle)
+    _leave(handle)
     if callback is not None:
         handle.callback = callback
     handle.handles = self.handles
@@ -58,10 +49,7 @@ def add(
 
 def remove(self: "Executor", handle: "Any") -> None:
     """Runs a handle no more; the others keep their order. HandleError when it is not here."""
-    if handle not in self.handles:
-        from muros.rclc.handle_error import absent
-
-        absent(handle)
+    borrow("muros.rclc.handle_error").check_there(self, handle)
     self.handles.remove(handle)
 
 
@@ -85,16 +73,13 @@ def spin_one_period(self: "Executor", period: float = 0) -> None:
 
 def destroy(self: "Handle") -> None:
     """Takes a handle away, with all that waits."""
-    for place in (self.handles or self.context.handles, getattr(self, "home", [])):
-        if self in place:
-            place.remove(self)
+    _leave(self)
     if self.entity is not None:
         self.entity.destroy()
     self.cancelled = True  # a timer
     self.depth = 0  # a service
     for name in ("_waiting", "_answers", "_asked"):
-        if hasattr(self, name):
-            getattr(self, name).clear()
+        getattr(self, name, []).clear()
 
 
 def exchange_period(self: "Timer", period: float) -> float:
@@ -135,3 +120,10 @@ def wait_for_service(self: "Client", timeout: float = _TIMEOUT) -> bool:
     from muros.rclc.graph import wait_for_service as wait
 
     return wait(self, timeout)
+
+
+def _leave(handle: "Any") -> None:
+    """Takes a handle out of the list of its executor, or of what none has claimed."""
+    handles = handle.handles or handle.context.handles
+    if handle in handles:
+        handles.remove(handle)

@@ -75,6 +75,11 @@ class ExpiringService(Service):
             self._since.append(now)
 
 
+def expiring(handle: "Any") -> "Any":
+    """The class here in place of ``Subscription`` or ``Service``."""
+    return ExpiringService if handle is Service else ExpiringSubscription
+
+
 def drop(since: "Any", waiting: "Any", lifespan: int, now: int) -> int:
     """Drops from ``waiting`` what has been there for ``lifespan`` ms or more, and returns how many.
 

@@ -58,17 +58,16 @@ def subscription(
     """
     from muros.rclc.subscription import Subscription
 
-    def enter(taker: "Any") -> "Any":  # a session calls its ``deliver``, which saves the heap a bound method
-        return self.context.middleware.reader(self.participant, self._topic(topic), kind.TYPE, qos, taker)
-
-    lifespan = getattr(qos, "lifespan", 0)
-    if lifespan:
-        from muros.rclc.lifespans import ExpiringSubscription
-
-        made: "Subscription" = ExpiringSubscription(self.context, kind, callback, lifespan)
-    else:
-        made = Subscription(self.context, kind, callback)
-    _join(self, made, enter, memory, kind)
+    made: "Subscription" = _made(self, Subscription, kind, callback, qos)
+    taker = memory.guard(made, kind) if memory else made
+    reader = self.context.middleware.reader(
+        self.participant,
+        self._topic(topic),
+        kind.TYPE,
+        qos,
+        taker,  # type: ignore[arg-type]  # a session calls its ``deliver``, which saves the heap a bound method
+    )
+    _join(self, made, reader)
     return made
 
 
@@ -95,19 +94,12 @@ def service(
     """
     from muros.rclc.service import Service
 
-    def enter(taker: "Any") -> "Any":
-        return self.context.middleware.replier(
-            self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
-        )
-
-    lifespan = getattr(qos, "lifespan", 0)
-    if lifespan:
-        from muros.rclc.lifespans import ExpiringService
-
-        made: "Service" = ExpiringService(self.context, kind, callback, lifespan)
-    else:
-        made = Service(self.context, kind, callback)
-    _join(self, made, enter, memory, kind.Request)
+    made: "Service" = _made(self, Service, kind, callback, qos)
+    taker = memory.guard(made, kind.Request) if memory else made
+    replier = self.context.middleware.replier(
+        self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
+    )
+    _join(self, made, replier)
     return made
 
 
@@ -117,22 +109,19 @@ def client(
     """A client of a service; ``memory`` bounds what responses take."""
     from muros.rclc.client import Client
 
-    def enter(taker: "Any") -> "Any":
-        return self.context.middleware.requester(
-            self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
-        )
-
     made = Client(self.context, kind)
-    _join(self, made, enter, memory, kind.Response)
+    taker = memory.guard(made, kind.Response) if memory else made
+    requester = self.context.middleware.requester(
+        self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
+    )
+    _join(self, made, requester)
     return made
 
 
 def destroy(self: "Node") -> None:
     """Takes the node and everything made on it away."""
-    made = self.entities
-    self.entities = []
-    for entity in made[:]:
-        entity.destroy()
+    while self.entities:
+        self.entities.pop(0).destroy()
     self.participant.destroy()
 
 
@@ -140,15 +129,20 @@ def __getattr__(name: str) -> "Any":
     return getattr(borrow("muros.rclc.compositions"), name)
 
 
-def _join(
-    self: "Node", made: "Any", enter: "Callable[[Any], Any]", memory: "Rules | None", kind: "Any"
-) -> None:
-    """Has the middleware make what stands behind a handle; where it cannot, the handle is gone, too."""
-    try:
-        made.entity = enter(memory.guard(made, kind) if memory else made)
-    except Exception:
-        made.destroy()
-        raise
+def _made(self: "Node", handle: "Any", kind: "Any", callback: "Any", qos: "str | Qos") -> "Any":
+    """A handle of a class, or of the one in its place that drops what is too old for the QoS."""
+    lifespan = getattr(qos, "lifespan", 0)
+    if not lifespan:
+        return handle(self.context, kind, callback)
+    from muros.rclc.lifespans import expiring
+
+    return expiring(handle)(self.context, kind, callback, lifespan)
+
+
+def _join(self: "Node", made: "Any", entity: "Any") -> None:
+    """Gives a handle what the middleware has made for it; from now on executors run it."""
+    made.entity = entity
+    self.context.handles.append(made)
     self.entities.append(made)
 
 
@@ -164,13 +158,12 @@ def _resolve(self: "Node", name: str) -> str:
 
 def _check(name: str) -> None:
     """Raises InvalidNameError unless ``name`` and each part of it is made as ROS asks."""
-    for part in name.split("/"):
-        plain = part.replace("_", "a")
-        for digit in "0123456789":
-            plain = plain.replace(digit, "a")
-        if not plain.isalpha() or part[0] in "0123456789" or len(part) != len(part.encode()):
+    before = "/"
+    for c in name + "/":
+        if c > "z" or not (c.isalpha() or c == "_" or (before != "/" and (c == "/" or c.isdigit()))):
             from muros.rclc.errors import InvalidNameError
 
             raise InvalidNameError(
                 "%r: names are made of letters, digits and _, and begin with no digit" % name
             )
+        before = c

@@ -94,17 +94,13 @@ class RosTimer(Timer):
         self.cancelled = False
         self.begin_anew()
 
-    def ready(self, now: int) -> bool:
-        """Whether its time has come."""
-        return self._time.known and super().ready(self._time.ticks())
-
     def run(self, now: int) -> None:
         """Calls the callback and sets the next time."""
         super().run(self._time.ticks())
 
     def left(self, now: int) -> int:
         """Milliseconds until its time comes: what brings it is a message."""
-        return 0 if self.ready(now) else _NEVER
+        return 0 if self._time.known and super().left(self._time.ticks()) == 0 else _NEVER
 
 
 def clock_class() -> "Any":

@@ -29,7 +29,7 @@ class Service(Handle):
         refused: int  # requests beyond the rules for memory, where there are some, see ``memory``
 
     def __init__(self, context: "Context", kind: "Any", callback: "Callable[[Any], Any]") -> None:
-        super().__init__(context)
+        self.context = context
         self.callback = callback
         self._kind = kind
         self._waiting: "list[tuple[bytes, Any]]" = []
@@ -51,10 +51,9 @@ class Service(Handle):
         request = self._kind.Request()
         try:
             request.read(buf, off, n)
+            self._waiting.append((identity, request))
         except ValueError:
             self.malformed += 1
-            return
-        self._waiting.append((identity, request))
 
     def ready(self, now: int) -> bool:
         """Whether a request can be taken, or an answer sent."""

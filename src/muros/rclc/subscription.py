@@ -28,7 +28,7 @@ class Subscription(Handle):
         refused: int  # samples beyond the rules for memory, where there are some, see ``memory``
 
     def __init__(self, context: "Context", kind: "Any", callback: "Callable[[Any], object] | None") -> None:
-        super().__init__(context)
+        self.context = context
         self.callback = callback
         self._message = kind()
 

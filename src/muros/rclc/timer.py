@@ -42,10 +42,6 @@ class Timer(Handle):
         self.cancelled = False
         self._next = ticks_add(self.context.clock() if now is None else now, self.period)
 
-    def ready(self, now: int) -> bool:
-        """Whether its time has come."""
-        return not self.cancelled and ticks_diff(now, self._next) >= 0
-
     def run(self, now: int) -> None:
         """Calls the callback and sets the next time."""
         period = self.period

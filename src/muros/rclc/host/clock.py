@@ -10,9 +10,9 @@ the value that is given for it counts: ``-p use_sim_time:=true``.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from muros.rclc import handles
+from muros.rclc.host.handles import take_away
 from muros.rclc.host.logger import system_time
 from muros.rclc.ros_time import RosTime, RosTimer, clock_class
 from muros.rclc.timer import Timer
@@ -88,12 +88,13 @@ class ClockTimer(RosTimer):
     """Made by ``Clock.timer``; see ``Timer``. With simulated time it is still until that is known."""
 
     _time: Clock
+    home: Any = ()
 
     def destroy(self) -> None:
         """Takes it away."""
         if self in self._time.timers:
             self._time.timers.remove(self)
-        handles.destroy(self)
+        take_away(self)
 
     def left(self, now: int) -> int:
         """Milliseconds until its time comes; with simulated time what brings it is a message."""

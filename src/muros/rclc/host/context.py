@@ -215,12 +215,10 @@ class Node(context_.Node):
         name = self._topic(topic)
         made = self._subscription(kind, callback, qos)
         made.topic = topic
-        reader = self.context.middleware.reader
-
-        def make(taker: Any) -> Any:
-            return reader(self.participant, name, kind.TYPE, qos, taker.deliver)
-
-        return self._join(made, make, memory, kind)
+        deliver = _taker(made, memory, kind).deliver
+        return self._join(
+            made, self.context.middleware.reader(self.participant, name, kind.TYPE, qos, deliver)
+        )
 
     def timer(self, period: float, callback: Callable[[], object], autostart: bool = True) -> Timer:
         """A timer; an executor calls ``callback()`` every ``period`` seconds."""
@@ -249,12 +247,8 @@ class Node(context_.Node):
         full = self._resolve(name)
         made = self._service(kind, callback, qos)
         made.name = full
-        replier = self.context.middleware.replier
-
-        def make(taker: Any) -> Any:
-            return replier(self.participant, full, kind.TYPE, taker.deliver, qos)
-
-        self._join(made, make, memory, kind.Request)
+        deliver = _taker(made, memory, kind.Request).deliver
+        self._join(made, self.context.middleware.replier(self.participant, full, kind.TYPE, deliver, qos))
         self.context.services[made.name] = made
         return made
 
@@ -268,12 +262,10 @@ class Node(context_.Node):
         made = Client(self.context, kind)
         made.name = full
         made.node = self
-        requester = self.context.middleware.requester
-
-        def make(taker: Any) -> Any:
-            return requester(self.participant, full, kind.TYPE, taker.deliver, qos)
-
-        return self._join(made, make, memory, kind.Response)
+        deliver = _taker(made, memory, kind.Response).deliver
+        return self._join(
+            made, self.context.middleware.requester(self.participant, full, kind.TYPE, deliver, qos)
+        )
 
     def lifecycle(
         self,
@@ -420,20 +412,10 @@ class Node(context_.Node):
 
         return ExpiringService(self.context, kind, callback, qos)
 
-    def _join(self, handle: Made, make: Callable[[Any], Any], memory: Rules | None, kind: Any) -> Made:
-        """Gives a handle its entity, which ``make(taker)`` makes; one that cannot be made leaves nothing behind.
-
-        ``memory`` bounds what comes, which is of ``kind``.
-        """
-        try:
-            if memory is not None and not hasattr(memory, "guard"):
-                raise WrongTypeError(f"memory is Rules(...), not {memory!r}")
-            handle.entity = make(handle if memory is None else memory.guard(handle, kind))
-        except Exception:
-            self.context.handles.remove(handle)
-            raise
+    def _join(self, handle: Made, entity: Any) -> Made:
+        """Gives a handle what the middleware has made for it; from now on executors run it."""
         handle.home = self.entities
-        self.entities.append(handle)
+        node_._join(self, handle, entity)
         return handle
 
     def _topic(self, name: str) -> str:
@@ -461,3 +443,12 @@ class Node(context_.Node):
         be_text(name, "the name of a topic or service")
         full = node_._resolve(self, name)
         return remapping.remap(full, kind, self.name, self.namespace, self.rules) if self.rules else full
+
+
+def _taker(handle: Made, memory: Rules | None, kind: Any) -> Any:
+    """What takes samples for a handle: with ``memory`` what bounds them, which are of ``kind``."""
+    if memory is None:
+        return handle
+    if not hasattr(memory, "guard"):
+        raise WrongTypeError(f"memory is Rules(...), not {memory!r}")
+    return memory.guard(handle, kind)

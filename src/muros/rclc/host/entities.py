@@ -11,6 +11,7 @@ from muros.rclc import handles
 from muros.rclc import service as service_
 from muros.rclc.errors import RclError
 from muros.rclc.host.checks import WrongTypeError, be_callable, called, fits, other
+from muros.rclc.host.handles import take_away
 from muros.rclc.host.outlet import LOG_TOPIC, body, outlet
 from muros.rclc.host.sharing import call_elsewhere, hand_over
 from muros.rclc.host.waiting import publish_confirmed, wait_confirmed
@@ -77,6 +78,7 @@ class Service(service_.Service):
 
     name = ""
     refused = 0  # requests beyond the rules for memory
+    home: Any = ()
     context: Context
     session_timeout = 0.0
     """Seconds for which ``reply`` waits until an answer is confirmed; 0: it does not wait."""
@@ -104,7 +106,7 @@ class Service(service_.Service):
     def destroy(self) -> None:
         """Takes it away."""
         self.context.services.pop(self.name, None)
-        handles.destroy(self)
+        take_away(self)
 
 
 class Client(client_.Client):
@@ -112,8 +114,10 @@ class Client(client_.Client):
 
     name = ""
     refused = 0  # responses beyond the rules for memory
+    home: Any = ()
     context: Context
     node: Node
+    destroy = take_away
     session_timeout = 0.0
     """Seconds for which ``send`` waits until a request is confirmed; 0: it does not wait."""
 
@@ -157,7 +161,7 @@ class Client(client_.Client):
         """Sends a request that was held back, or comes from another thread; one not taken then has no answer."""
         taken = super().send(request, on_reply, timeout)
         if not taken:
-            self._waiting.append((on_reply, None))
+            self._asked.append([0, on_reply, 0, None])
         return taken
 
     def call(self, request: Any, timeout: float = client_._TIMEOUT) -> Any:

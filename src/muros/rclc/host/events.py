@@ -12,10 +12,10 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from muros.rclc import handles
 from muros.rclc.executor import _NEVER, Handle
 from muros.rclc.host.checks import WrongTypeError, be_callable
 from muros.rclc.host.entities import Publisher
+from muros.rclc.host.handles import take_away
 from muros.rclc.subscription import Subscription
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ class Events(Handle):
     def destroy(self) -> None:
         """Tells no more."""
         self._source.close()
-        handles.destroy(self)
+        take_away(self)
 
     def _news(self, name: str, now: int) -> bool:
         if name == MATCHED and self._source.current() != self._present:

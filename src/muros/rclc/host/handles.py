@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from muros.client import reasons
 from muros.client.qos import profile
 from muros.rclc import guard as guard_
+from muros.rclc import handles
 from muros.rclc import subscription as subscription_
 from muros.rclc import timer as timer_
 from muros.rclc.host.checks import WrongTypeError, be_callable, be_period
@@ -34,11 +35,20 @@ def ticks() -> int:
     return time.monotonic_ns() / 1e6  # type: ignore[return-value]  # boards count whole ones
 
 
+def take_away(self: Any) -> None:
+    """Takes a handle away, with all that waits, and from what its node has made."""
+    if self in self.home:
+        self.home.remove(self)
+    handles.destroy(self)
+
+
 class Subscription(subscription_.Subscription):
     """Made by ``Node.subscription``; its first malformed sample is a problem that is told."""
 
     topic = ""
     refused = 0  # samples beyond the rules for memory
+    home: Any = ()  # what its node has made
+    destroy = take_away
 
     def __init__(
         self, context: Context, kind: Any, callback: Callable[[Any], object] | None, qos: str | Qos
@@ -102,6 +112,9 @@ class Timer(timer_.Timer):
 
     ``since`` is in ms, with fractions.
     """
+
+    home: Any = ()
+    destroy = take_away
 
     def __init__(
         self, context: Context, period: float, callback: Callable[[], object], autostart: bool
