@@ -1,11 +1,11 @@
 """Streams by themselves: windows, numbers that wrap, bitmaps, repetitions. See also ``tests/xrce/test_streams.py``."""
 
 from muros.compat import const
-from muros.xrce import inputs, outputs
-from muros.xrce.mending import accept, advance, announce, missing, resend
-from muros.xrce.resetting import reset_input
+from muros.xrce.beginning import make_input, make_output
+from muros.xrce.mending import accept, announce, missing, resend
+from muros.xrce.resetting import reset_input, reset_output
 from tests.board.harness import allocates, raises
-from tests.board.test_session import End, message, submessage
+from tests.board.test_session import End, idle, message, submessage
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class Line:
 
 def output(history: int = 4, mtu: int = 32, start: int = 0) -> "Output":
     """A sender that has sent and got acknowledged everything before ``start``."""
-    stream = outputs.make(0x80, mtu, bytearray(b"\x81\0\0\0"), history, 100)
+    stream = make_output(0x80, mtu, bytearray(b"\x81\0\0\0"), history, 100)
     stream.next = stream.first = stream.sent = start
     return stream
 
@@ -41,7 +41,7 @@ def output(history: int = 4, mtu: int = 32, start: int = 0) -> "Output":
 def fill(stream: "Output", n: int = 8) -> bool:
     """Puts one submessage of ``n`` bytes into the stream, its bytes all equal to its number."""
     number = stream.next
-    at = stream.reserve(n)
+    at = stream.place(n)
     if at < 0:
         return False
     buf = stream.buf
@@ -51,6 +51,7 @@ def fill(stream: "Output", n: int = 8) -> bool:
     buf[at + 3] = 0
     for i in range(n):
         buf[at + 4 + i] = number & 255
+    stream.commit(at, n)
     return True
 
 
@@ -64,7 +65,7 @@ def acknowledge(stream: "Output", first: int, bitmap: int, send: "Send", now: in
 
 def receiver(window: int = 16, start: int = 0) -> "Input":
     """A receiver that expects ``start``."""
-    stream = inputs.make(0x80, 32, window)
+    stream = make_input(0x80, 32, window)
     stream.expected = start
     return stream
 
@@ -75,9 +76,17 @@ def take(stream: "Input", number: int) -> "list[int]":
     handled: "list[int]" = []
     if accept(stream, number, bytes((number & 255, number >> 8)), 0, 2):
         handled.append(number)
-        advance(stream, 1)
+        advance(stream)
         handled += kept(stream)
     return handled
+
+
+def advance(stream: "Input") -> None:
+    """What a session does when it has handled the expected message."""
+    stream.early.pop(stream.expected, None)
+    stream.expected = stream.expected + 1 & 0xFFFF
+    if stream.known:
+        stream.known -= 1
 
 
 def kept(stream: "Input") -> "list[int]":
@@ -87,7 +96,7 @@ def kept(stream: "Input") -> "list[int]":
         body = stream.early[stream.expected]
         assert len(body) == 2
         handled.append(body[0] | body[1] << 8)
-        advance(stream, 1)
+        advance(stream)
     return handled
 
 
@@ -105,7 +114,7 @@ def newer(end: End, *numbers: int) -> "list[bool]":
 
 def test_best_effort_numbers_count_and_wrap() -> None:
     line = Line()
-    stream = outputs.make(1, 32, bytearray(b"\x81\0\0\0"))
+    stream = make_output(1, 32, bytearray(b"\x81\0\0\0"))
     stream.next = stream.first = stream.sent = 65534
     for _ in range(4):
         assert fill(stream)
@@ -116,7 +125,7 @@ def test_best_effort_numbers_count_and_wrap() -> None:
 
 def test_best_effort_packs_until_the_mtu() -> None:
     line = Line()
-    stream = outputs.make(1, 32, bytearray(b"\x81\0\0\0"))
+    stream = make_output(1, 32, bytearray(b"\x81\0\0\0"))
     assert fill(stream, 5)  # 4 + 4 + 5 = 13
     assert fill(stream, 8)  # 16 + 4 + 8 = 28
     assert not fill(stream, 1)  # 28 + 4 + 1 = 33
@@ -127,10 +136,10 @@ def test_best_effort_packs_until_the_mtu() -> None:
 
 
 def test_best_effort_refuses_what_never_fits() -> None:
-    stream = outputs.make(1, 32, bytearray(b"\x81\0\0\0"))
-    assert stream.capacity() == 24
+    stream = make_output(1, 32, bytearray(b"\x81\0\0\0"))
+    assert stream.capacity == 24
     assert fill(stream, 24)
-    stream.reset()
+    reset_output(stream)
     assert not fill(stream, 25)
 
 
@@ -154,7 +163,7 @@ def test_best_effort_half_the_numbers_are_newer() -> None:
 def test_history_must_be_a_power_of_two() -> None:
     for wrong in (0, 3, 5, 0x8000):
         with raises(ValueError):
-            outputs.make(0x80, 32, bytearray(4), wrong, 100)
+            make_output(0x80, 32, bytearray(4), wrong, 100)
 
 
 def test_a_full_history_takes_no_more() -> None:
@@ -183,7 +192,7 @@ def test_every_number_is_sent_once_and_acknowledged_across_the_wrap() -> None:
         sent += line.numbers()
         if now % 3 == 2:
             assert acknowledge(stream, (sent[-1] + 1) & 0xFFFF, 0, line.send, now)
-            assert stream.idle()
+            assert idle(stream)
     assert sent == [(NEAR_WRAP + i) & 0xFFFF for i in range(80)]
     assert line.messages == []
 
@@ -241,7 +250,7 @@ def test_acknowledgements_of_numbers_never_sent_change_nothing() -> None:
     assert stream.first == 65535
     assert line.numbers() == []
     assert acknowledge(stream, 1, 0, line.send, 60)
-    assert stream.idle()
+    assert idle(stream)
 
 
 def test_old_acknowledgements_change_nothing() -> None:
@@ -296,8 +305,8 @@ def test_reset_begins_with_number_0() -> None:
     for _ in range(4):
         fill(stream)
     stream.flush(line.send, 0)
-    stream.reset()
-    assert stream.idle()
+    reset_output(stream)
+    assert idle(stream)
     line.messages = []
     fill(stream)
     stream.flush(line.send, 0)
@@ -306,7 +315,7 @@ def test_reset_begins_with_number_0() -> None:
     assert line.numbers() == [0]
 
 
-def test_unacknowledged_shows_what_is_kept_in_order() -> None:
+def test_what_is_kept_can_be_shown_in_order() -> None:
     line = Line()
     stream = output(history=4, mtu=16, start=65534)
     for _ in range(3):
@@ -314,7 +323,7 @@ def test_unacknowledged_shows_what_is_kept_in_order() -> None:
     stream.flush(line.send, 0)
     acknowledge(stream, 65535, 0, line.send, 0)
     line.numbers()
-    stream.unacknowledged(line.send)
+    stream.transmit(stream.first, stream.next, line.send)
     assert line.numbers() == [65535, 0]
 
 

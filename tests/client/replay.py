@@ -22,7 +22,6 @@ from muros.client.requests import submit
 from muros.client.session import Entity
 from muros.xrce import create, create_text
 from muros.xrce._types import Buffer
-from muros.xrce.beginning import flush
 from muros.xrce.constants import (
     ACKNACK,
     CREATE,
@@ -50,6 +49,7 @@ from muros.xrce.representation import (
     encode_variant,
     parse_variant_untrusted,
 )
+from muros.xrce.session import flush as flush_reliable
 
 VECTORS = Path(__file__).parent.parent / "vectors"
 
@@ -155,6 +155,15 @@ def by_stream(messages: list[bytes]) -> dict[Any, Any]:
     return streams
 
 
+def flush(session: Any, now: int) -> None:
+    """Sends what was built on any stream, and the HEARTBEAT that is due."""
+    for stream in session.outputs.values():
+        if stream.reliable:
+            flush_reliable(session, stream, now)
+        else:
+            stream.flush(session.send, now)
+
+
 class Held:
     """A stream that is not flushed by each sample: the reference packs what is written between two runs."""
 
@@ -165,6 +174,7 @@ class Held:
         self.commit = stream.commit
         self.mtu = stream.mtu
         self._start = stream._start
+        self.capacity = stream.capacity
 
     @property
     def buf(self) -> bytearray:

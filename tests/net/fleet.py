@@ -109,7 +109,11 @@ class Client:
     def ready(self) -> bool:
         """Whether everything is created and acknowledged (the agent may be out of sight again meanwhile)."""
         session = self.session
-        return session.state in (CONNECTED, LOST) and session.pending == 0 and session.reliable.idle()
+        return (
+            session.state in (CONNECTED, LOST)
+            and session.pending == 0
+            and session.reliable.first == session.reliable.next
+        )
 
     def spin(self, now: int, writing: bool) -> None:
         """Takes what has come, writes what it may."""

@@ -50,7 +50,11 @@ class Board:
         for _ in range(200):
             executor.spin_some(0.005)
             self.world.run(1, 1)
-            if self.session.state == CONNECTED and self.session.pending == 0 and self.session.reliable.idle():
+            if (
+                self.session.state == CONNECTED
+                and self.session.pending == 0
+                and self.session.reliable.first == self.session.reliable.next
+            ):
                 return self
         raise AssertionError("it does not connect")
 

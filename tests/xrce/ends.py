@@ -5,18 +5,18 @@ import struct
 from collections.abc import Callable
 from typing import Any
 
-from muros.xrce import beginning, inputs, outputs, resetting
 from muros.xrce._types import Buffer
+from muros.xrce.beginning import make_input, make_output
 from muros.xrce.constants import HANDLED, LATER
-from muros.xrce.queues import QueuedReliableOutput, resume
-from muros.xrce.session import SessionCore
+from muros.xrce.queues import HostSession, QueuedOutput, QueuedReliableOutput, resume
+from muros.xrce.streams import Output
 
 KEY = b"\xaa\xbb\xcc\xdd"
 RELIABLE = 0x80
 NUMBERS = 0x10000
 
 
-class End(SessionCore):
+class End(HostSession):
     """One end. ``out`` keeps what it sends, ``got`` the payloads it handled; ``is_busy()`` says to answer LATER."""
 
     def __init__(
@@ -29,29 +29,29 @@ class End(SessionCore):
         start: int = 0,
         largest: int = 1 << 20,
     ) -> None:
-        beginning.begin(self, 1 if keyed else 0x81, KEY, self._keep, self._take, largest)
+        self.begin(1 if keyed else 0x81, KEY, self._keep, self._take, largest)
         self.hosts = hosts
         self.mtu = mtu
         self.out: list[bytes] = []
         self.got: list[bytes] = []
         self.is_busy: Callable[[], bool] = lambda: False
         self.stop_at_failure = False
-        output: Any = (QueuedReliableOutput if hosts else outputs.make)(RELIABLE, mtu, self.head, window, 100)
+        output: Any = (
+            QueuedReliableOutput(RELIABLE, mtu, self.head, window, 100)
+            if hosts
+            else make_output(RELIABLE, mtu, self.head, window, 100, QueuedOutput())
+        )
         output.next = output.first = output.sent = start
         self.outputs[RELIABLE] = output
         self._window = window
         self._begin = start
         self.make_input(RELIABLE)
 
-    reset = resetting.reset
-    stranger = beginning.stranger
-    heartbeats = flush = beginning.flush
-
     def make_input(self, stream_id: int) -> Any:
         """Every stream comes into being."""
-        stream = inputs.make(stream_id)
+        stream = make_input(stream_id)
         if stream_id >= RELIABLE:
-            stream = inputs.make(stream_id, self.mtu, self._window)
+            stream = make_input(stream_id, self.mtu, self._window)
             stream.expected = self._begin
         self.inputs[stream_id] = stream
         return stream
@@ -68,11 +68,7 @@ class End(SessionCore):
         stream = self.outputs[RELIABLE]
         if self.hosts:
             return bool(stream.post(submessage, self.send, now))
-        at = stream.reserve(len(body))
-        if at < 0:
-            return False
-        stream.buf[at : at + len(submessage)] = submessage
-        return True
+        return write(stream, submessage)
 
     def take(self) -> list[bytes]:
         """What was sent since the last call."""
@@ -95,6 +91,17 @@ class End(SessionCore):
         return HANDLED
 
 
+def write(stream: Output, submessage: bytes) -> bool:
+    """Puts a submessage into a board's stream; False when there is no room."""
+    n = len(submessage) - 4
+    at = stream.place(n)
+    if at < 0:
+        return False
+    stream.buf[at : at + len(submessage)] = submessage
+    stream.commit(at, n)
+    return True
+
+
 def converse(
     one: End, other: End, dice: random.Random, bodies: list[bytes], *, loss: float, rounds: int = 4000
 ) -> int:
@@ -111,7 +118,6 @@ def converse(
                 del todo[0]
             resume(end, RELIABLE, now)
             end.flush(now)
-            end.heartbeats(now)
             for message in end.take():
                 for _ in range(2 if dice.random() < 0.1 else 1):
                     if dice.random() >= loss:

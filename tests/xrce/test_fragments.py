@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from muros.xrce.fragments import Cutter, Joiner
+from muros.xrce.fragments import Cutter
 from tests.xrce.ends import RELIABLE, End
 
 sizes = st.integers(0, 700)
@@ -35,12 +35,11 @@ def carry(sender: End, receiver: End, bodies: list[bytes], dice: random.Random, 
                     break
                 cutter = None
         sender.flush(now)
-        sender.heartbeats(now)
         for end, peer in ((sender, receiver), (receiver, sender)):
             for message in end.take():
                 if dice.random() >= loss:
                     peer.tell(message, now)
-        if not todo and cutter is None and stream.idle():
+        if not todo and cutter is None and stream.first == stream.next:
             return
     raise AssertionError("it does not end")
 
@@ -103,35 +102,52 @@ def test_pieces_are_as_long_as_they_can_be() -> None:
 def test_a_joiner_keeps_what_fits_and_passes_over_what_does_not(
     pieces: list[tuple[bytes, bool]], limit: int
 ) -> None:
-    joiner = Joiner(limit)
+    end = End(hosts=True, largest=limit)
+    stream = end.inputs[RELIABLE]
+    told: list[tuple[int, int]] = []
+    end.too_long = lambda stream_id, n: told.append((stream_id, n))  # type: ignore[method-assign]
     expected = b""
     for piece, last in pieces:
+        end._on_fragment(stream, b"##" + piece + b"#", 2, len(piece), last)
+        joiner = stream.fragments
         expected += piece
-        whole = joiner.add(piece, 0, len(piece), last)
-        assert len(joiner.data) <= limit
-        assert whole == (last and len(expected) <= limit)
-        if whole:
-            assert joiner.data == expected
-            assert joiner.add(piece, 0, len(piece), last), "asked again about the same piece"
-            assert joiner.data == expected
-        if last:
-            assert (joiner.too_long > 0) == (len(expected) > limit)
-            assert joiner.too_long in (0, len(expected))
-            joiner.clear()
-            expected = b""
+        if not last:
+            assert joiner.data == (expected if len(expected) <= limit else b"")
+            continue
+        assert joiner is None
+        assert told == ([(RELIABLE, len(expected))] if len(expected) > limit else [])
+        told.clear()
+        expected = b""
 
 
 def test_a_torn_joiner_waits_for_the_end() -> None:
-    joiner = Joiner(100)
-    joiner.tear()
-    assert joiner.add(b"whole", 0, 5, True), "nothing had begun"
-    joiner.clear()
-    joiner.add(b"begun", 0, 5, False)
-    joiner.tear()
-    joiner.tear()
-    assert not joiner.add(b"more", 0, 4, False)
-    assert not joiner.add(b"last", 0, 4, True)
-    assert joiner.data == b""
-    joiner.clear()
-    assert joiner.add(b"next", 0, 4, True)
-    assert joiner.data == b"next"
+    end = End(hosts=True)
+    stream = end.inputs[RELIABLE]
+    whole = submessage(b"whole")
+    end._on_fragment(stream, whole, 0, 6, 0)
+    stream.fragments.tear()
+    stream.fragments.tear()
+    end._on_fragment(stream, b"more", 0, 4, 0)
+    assert stream.fragments.data == b""
+    end._on_fragment(stream, whole, 6, 3, 2)
+    assert (end.got, end.malformed, stream.fragments) == ([], 1, None)
+    end._on_fragment(stream, whole, 0, 6, 0)
+    end._on_fragment(stream, whole, 6, 3, 2)
+    assert (end.got, end.malformed, stream.fragments) == ([b"whole"], 1, None)
+
+
+def test_a_piece_that_comes_again_after_an_error_is_passed_over() -> None:
+    """The message with the last piece is not acknowledged, so it does come again."""
+    end = End(hosts=True)
+    stream = end.inputs[RELIABLE]
+    whole = submessage(b"whole")
+
+    def broken() -> bool:
+        raise ValueError("a user's callback")
+
+    end.is_busy, good = broken, end.is_busy
+    with pytest.raises(ValueError, match="callback"):
+        end._on_fragment(stream, whole, 0, 9, 2)
+    end.is_busy = good
+    end._on_fragment(stream, whole, 0, 9, 2)
+    assert (end.got, end.malformed, stream.fragments) == ([], 1, None)

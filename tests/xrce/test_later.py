@@ -1,9 +1,32 @@
 """Streams that a slow reader holds, and that go on where they were. See also ``tests/board/test_session.py``."""
 
-from muros.xrce._types import Buffer
-from muros.xrce.constants import HANDLED, LATER
-from muros.xrce.queues import resume
-from tests.board.test_session import End, acknack, data, pieces, submessage
+from muros.xrce._types import Buffer, Handle
+from muros.xrce.constants import FAILED, HANDLED, LATER
+from muros.xrce.queues import HostSession, resume
+from tests.board import test_session
+from tests.board.test_session import acknack, data, heartbeat, message, pieces, submessage
+
+
+class End(HostSession, test_session.End):
+    """One end, on a host."""
+
+    def __init__(self) -> None:
+        test_session.End.__init__(self)
+        self.answer_with(self._handle)
+
+    def answer_with(self, handle: Handle) -> None:
+        """Has ``handle`` answer submessages."""
+        self.begin(0x81, None, self.send, handle, self.largest)
+
+
+def test_failure_ends_the_message_only_when_asked_to() -> None:
+    for stops in (False, True):
+        end = End()
+        end.stop_at_failure = stops
+        end.answers = [HANDLED, FAILED, HANDLED]
+        end.tell(data(0, b"a", b"b", b"c"))
+        assert end.bodies() == ([b"a", b"b"] if stops else [b"a", b"b", b"c"])
+        assert end.take() == [acknack(1, 0)]
 
 
 def test_later_holds_the_stream_until_resumed() -> None:
@@ -55,7 +78,7 @@ def test_resuming_from_inside_goes_on_outside() -> None:
         depth[1] -= 1
         return HANDLED
 
-    end._handle = handle
+    end.answer_with(handle)
     end.tell(data(0, b"a", b"b", b"c"))
     end.tell(data(1, b"d"))
     resume(end, 0x80, 1)
@@ -78,3 +101,61 @@ def test_later_inside_a_joined_piece() -> None:
     resume(end, 0x80, 2)
     assert end.bodies() == [b"b" * 4, b"c" * 4, b"z"]
     assert end.take()[-1] == acknack(len(messages) + 1, 0)
+
+
+def test_a_held_message_that_is_sent_again_goes_on_where_it_was() -> None:
+    end = End()
+    end.answers = [HANDLED, LATER, LATER]
+    end.tell(data(0, b"a", b"b", b"c"))
+    end.tell(data(0, b"a", b"b", b"c"))
+    assert end.bodies() == [b"a"]
+    end.tell(data(0, b"a", b"b", b"c"))
+    assert end.bodies() == [b"b", b"c"]
+    assert end.take() == [acknack(0, 0), acknack(0, 0), acknack(1, 0)]
+
+
+def test_a_heartbeat_for_a_held_stream_goes_on_where_it_was() -> None:
+    end = End()
+    end.answers = [HANDLED, LATER]
+    end.tell(data(0, b"a", b"b"))
+    end.tell(heartbeat(0, 0))
+    assert end.bodies() == [b"a", b"b"]
+    assert end.take() == [acknack(0, 0), acknack(1, 0)]
+
+
+def test_a_held_message_that_is_given_up_leaves_nothing() -> None:
+    end = End()
+    end.answers = [HANDLED, LATER]
+    end.tell(data(0, b"a", b"b"))
+    end.tell(data(2, b"c", b"d"))
+    end.tell(heartbeat(2, 2))
+    assert end.bodies() == [b"a", b"c", b"d"]
+
+
+def test_a_held_message_whose_pieces_are_given_up_leaves_nothing() -> None:
+    end = End()
+    joined = submessage(7, b"a" * 28) + submessage(7, b"b" * 4)
+    messages = pieces(joined, 0)
+    end.answers = [HANDLED, LATER]
+    for one in messages:
+        end.tell(one)
+    end.tell(heartbeat(len(messages), len(messages)))
+    for one in pieces(submessage(7, b"c" * 30), len(messages)):
+        end.tell(one)
+    assert end.bodies() == [b"a" * 28, b"c" * 30]
+    assert end.malformed == 0
+
+
+def test_a_message_that_resets_its_stream_is_not_held() -> None:
+    end = End()
+
+    def handle(kind: int, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
+        if kind == 12:
+            end.reset()
+            return HANDLED
+        return LATER
+
+    end.answer_with(handle)
+    end.tell(message(0x80, 0, submessage(12, b""), submessage(7, b"a")))
+    assert end.inputs[0x80].early == {}
+    assert end.take() == [acknack(0, 0)]

@@ -6,12 +6,13 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from muros.xrce import inputs, outputs
 from muros.xrce._types import Buffer, Send
-from muros.xrce.mending import accept, advance, announce, missing, resend
+from muros.xrce.beginning import make_input, make_output
+from muros.xrce.mending import accept, announce, missing, resend
 from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableOutput
 from muros.xrce.resetting import reset_input
 from muros.xrce.streams import Input, Output
+from tests.xrce.ends import write
 
 HEAD = b"\x81\0\0\0"
 starts = st.sampled_from([0, 65500, 65530, 65535])
@@ -87,8 +88,16 @@ def feed(stream: Input, number: int, content: bytes) -> list[bytes]:
     """A message arrives; what is handled because of it."""
     if not accept(stream, number & 0xFFFF, content, 0, len(content)):
         return []
-    advance(stream, 1)
+    advance(stream)
     return [content, *kept(stream)]
+
+
+def advance(stream: Input) -> None:
+    """What a session does when it has handled the expected message."""
+    stream.early.pop(stream.expected, None)
+    stream.expected = stream.expected + 1 & 0xFFFF
+    if stream.known:
+        stream.known -= 1
 
 
 def kept(stream: Input) -> list[bytes]:
@@ -96,7 +105,7 @@ def kept(stream: Input) -> list[bytes]:
     handled = []
     while stream.expected in stream.early:
         handled.append(stream.early[stream.expected])
-        advance(stream, 1)
+        advance(stream)
     return handled
 
 
@@ -111,7 +120,7 @@ steps = st.lists(
 
 @given(starts, windows, steps)
 def test_a_receiver_does_what_the_book_says(start: int, window: int, told: list[Any]) -> None:
-    stream, model = inputs.make(0x80, 8, window), Model(start, window)
+    stream, model = make_input(0x80, 8, window), Model(start, window)
     stream.expected = start
     for what, first, second in told:
         if what == "message":
@@ -136,7 +145,7 @@ acknowledgements = st.tuples(st.integers(-3, 20), st.integers(0, 0xFFFF), st.int
 @given(starts, windows, st.lists(st.binary(max_size=12) | acknowledgements, max_size=60))
 def test_senders_of_boards_and_hosts_are_alike(start: int, window: int, told: list[Any]) -> None:
     lines = [Line(), Line()]
-    board = outputs.make(0x80, 20, bytearray(HEAD), window, 100)
+    board = make_output(0x80, 20, bytearray(HEAD), window, 100)
     host = QueuedReliableOutput(0x80, 20, bytearray(HEAD), window, 100)
     now = 1000
     for stream in (board, host):
@@ -144,13 +153,11 @@ def test_senders_of_boards_and_hosts_are_alike(start: int, window: int, told: li
     for one in told:
         if isinstance(one, bytes):
             if host.free() > 0:
-                at = board.reserve(len(one))
-                assert at >= 0
-                board.buf[at : at + 4 + len(one)] = submessage(one)
+                assert write(board, submessage(one))
                 board.flush(lines[0].send, now)
                 assert host.post(submessage(one), lines[1].send, now)
             else:
-                assert board.reserve(len(one)) < 0
+                assert not write(board, submessage(one))
         else:
             ahead, bitmap, wait = one
             now += wait
@@ -165,11 +172,12 @@ def test_senders_of_boards_and_hosts_are_alike(start: int, window: int, told: li
             host.sent,
             host.resends,
         )
-        assert board.idle() or board.due == host.due
-        assert board.idle() == host.idle()
+        idle = board.first == board.next
+        assert idle or board.due == host.due
+        assert idle == host.idle()
     shown = [Line(), Line()]
-    board.unacknowledged(shown[0].send)
-    host.unacknowledged(shown[1].send)
+    board.transmit(board.first, board.next, shown[0].send)
+    host.transmit(host.first, host.next, shown[1].send)
     assert shown[0].sent == shown[1].sent
 
 
@@ -216,16 +224,15 @@ def test_a_queue_that_is_reset_forgets_what_waits() -> None:
 @given(st.lists(st.binary(max_size=20), max_size=20), st.sampled_from([0, 65530]))
 def test_best_effort_of_boards_and_hosts_are_alike(bodies: list[bytes], start: int) -> None:
     lines = [Line(), Line()]
-    board = outputs.make(1, 20, bytearray(HEAD))
+    board = make_output(1, 20, bytearray(HEAD))
     host = QueuedBestEffortOutput(1, 20, bytearray(HEAD))
     for stream in (board, host):
         stream.next = stream.first = stream.sent = start
     for body in bodies:
-        at = board.reserve(len(body))
-        if at >= 0:
-            board.buf[at : at + 4 + len(body)] = submessage(body)
+        fits = write(board, submessage(body))
+        if fits:
             board.flush(lines[0].send, 0)
-        assert host.post(submessage(body), lines[1].send, 0) == (at >= 0)
+        assert host.post(submessage(body), lines[1].send, 0) == fits
     assert lines[0].sent == lines[1].sent
     assert board.next == host.next
 
@@ -235,7 +242,7 @@ def test_an_early_message_that_the_heap_has_no_room_for_is_asked_for_again() -> 
         def __setitem__(self, number: int, message: bytes) -> None:
             raise MemoryError
 
-    stream = inputs.make(0x80, 64, 4)
+    stream = make_input(0x80, 64, 4)
     stream.early = Full()
     assert not accept(stream, 1, b"early", 0, 5)
     assert missing(stream) == 0b11

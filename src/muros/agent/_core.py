@@ -265,7 +265,7 @@ class AgentCore(Voice[Event]):
                 self.tell(ClientSilent(session.number, silence / 1000))
             if silence > dead or session.lost_at is not None:
                 continue
-            session.heartbeats(now)
+            session.flush(now)
             if all(stream_id < 0x80 or stream.idle() for stream_id, stream in session.outputs.items()):
                 self.unacknowledged.pop(session, None)
             else:

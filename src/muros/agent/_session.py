@@ -1,6 +1,6 @@
 """The session of one client at the agent: its object tree, and what each submessage does to it.
 
-The streams and their acknowledgements are `SessionCore`'s; links, addresses and time are the agent core's. What cannot
+The streams and their acknowledgements are `HostSession`'s; links, addresses and time are the agent core's. What cannot
 be done is answered with the status of the specification and reported as a finding; a client can only harm itself.
 """
 
@@ -20,8 +20,8 @@ from muros.agent._proxies import (
     WriterProxy,
 )
 from muros.agent.events import EntityCreated, EntityDeleted, client_name
-from muros.xrce import beginning, inputs, resetting
 from muros.xrce._types import Buffer
+from muros.xrce.beginning import make_input
 from muros.xrce.constants import (
     CREATE,
     DELETE,
@@ -49,9 +49,8 @@ from muros.xrce.constants import (
     WRITE_DATA,
 )
 from muros.xrce.fragments import Joiner
-from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableOutput, resume
+from muros.xrce.queues import HostSession, QueuedBestEffortOutput, QueuedReliableOutput, resume
 from muros.xrce.representation import InvalidRepresentation, Kind, parse_variant_untrusted
-from muros.xrce.session import SessionCore
 
 if TYPE_CHECKING:
     from muros.agent._core import AgentCore, Port
@@ -63,15 +62,11 @@ _UNMADE_KINDS = (Kind.TYPE, Kind.QOSPROFILE, Kind.APPLICATION)
 _IDENTITY = 24
 
 
-class AgentSession(SessionCore):
+class AgentSession(HostSession):
     """A client's session. ``key`` is the client key as bytes, ``mtu`` the longest message the client takes."""
 
-    reset = resetting.reset
-    stranger = beginning.stranger
-    heartbeats = flush = beginning.flush
-
     def __init__(self, core: "AgentCore", port: "Port", address: Any, key: bytes, session_id: int) -> None:
-        beginning.begin(self, session_id, key, self._send_lent, self._submessage, core.limits.max_sample)
+        self.begin(session_id, key, self._send_lent, self._submessage, core.limits.max_sample)
         self.core = core
         self.port = port
         self.address = address
@@ -228,19 +223,17 @@ class AgentSession(SessionCore):
                 remedy="Use fewer streams, or raise max_streams.",
             )
             return None
-        stream = self.inputs[stream_id] = inputs.make(stream_id, 0xFFFF, self.core.limits.window)
+        stream = self.inputs[stream_id] = make_input(stream_id, 0xFFFF, self.core.limits.window)
         return stream
 
-    def _on_fragment(self, stream: Any, buf: Buffer, at: int, n: int, last: int) -> int:
+    def _on_fragment(self, stream: Any, buf: Buffer, at: int, n: int, last: int) -> None:
         """Takes a piece, as long as what all clients have under way stays within the limit."""
         core = self.core
-        if core.joining + n > core.limits.max_joining and (
-            stream.fragments is None or not stream.fragments.torn
-        ):
-            if stream.fragments is None:
-                stream.fragments = Joiner(self.largest)
-            stream.fragments.clear()
-            stream.fragments.torn = True
+        joiner = stream.fragments
+        if core.joining + n > core.limits.max_joining and (joiner is None or joiner.limit > 0):
+            if joiner is None:
+                joiner = stream.fragments = Joiner(self.largest, stream.stream_id)
+            joiner.tear()
             core.report(
                 "too-much-joining",
                 who=self.who,
@@ -248,11 +241,10 @@ class AgentSession(SessionCore):
                 why=f"samples that come in pieces make {core.joining} B of {core.limits.max_joining} B",
                 remedy="Find the client that begins samples and does not end them, or raise limits.max_joining.",
             )
-        held = super()._on_fragment(stream, buf, at, n, last)
+        super()._on_fragment(stream, buf, at, n, last)
         self._joins(
             sum(len(s.fragments.data) for s in self.inputs.values() if s.reliable and s.fragments is not None)
         )
-        return held
 
     def _joins(self, n: int) -> None:
         self.core.joining += n - self.joining

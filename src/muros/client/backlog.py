@@ -51,7 +51,7 @@ class Backlog:
         ready = session.state == _CONNECTED and writer.todo == 0
         if writer.status or (not ready and not (stream.reliable and session.queue)):
             return self._refuse(_OFFLINE, _PROBLEM_OFFLINE, writer, n)
-        large = n + _HEAD > stream.mtu - stream._start - _HEAD
+        large = n + _HEAD > stream.capacity
         waiting = len(self.items)
         if ready and not large and not (stream.reliable and (waiting or self._cut)):
             at = stream.place(n + _HEAD)
@@ -100,7 +100,7 @@ class Backlog:
                 if data[0] == _WRITE_DATA and (session.state != _CONNECTED or session.pending):
                     break
                 n = len(data) - _HEAD
-                if n > stream.mtu - stream._start - _HEAD:
+                if n > stream.capacity:
                     self._cut = data
                     self.cutter = data.cutter() if hasattr(data, "end") else Cutter(data)
                 else:

@@ -286,7 +286,8 @@ def _unused(session: board.Session, kind: int) -> list[int]:
             pos += 4 + (buf[at + 2] | buf[at + 3] << 8) + 3 & ~3
 
     size = len(session.head)
-    session.reliable.unacknowledged(lambda buf, off, n: deleted(buf, off + size, n - size))
+    stream = session.reliable
+    stream.transmit(stream.first, stream.next, lambda buf, off, n: deleted(buf, off + size, n - size))
     if session.backlog is not None:
         for data in session.backlog.items:
             deleted(data, 0, len(data))

@@ -92,7 +92,7 @@ def output(self: "Session", reliable: int) -> "Output":
     if reliable:
         return self.reliable
     if _STREAM_BEST_EFFORT not in self.outputs:
-        self.outputs[_STREAM_BEST_EFFORT] = borrow("muros.xrce.outputs").make(
+        self.outputs[_STREAM_BEST_EFFORT] = borrow("muros.xrce.beginning").make_output(
             _STREAM_BEST_EFFORT, self.mtu, self.head
         )
     stream: "Output" = self.outputs[_STREAM_BEST_EFFORT]

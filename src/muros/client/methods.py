@@ -42,7 +42,7 @@ def make_input(self: "Session", stream_id: int) -> "Input | None":
     """The stream for best effort is made when something comes on it; there are no others."""
     if stream_id != _STREAM_BEST_EFFORT:
         return None
-    made: "Input" = borrow("muros.xrce.inputs").make(stream_id)
+    made: "Input" = borrow("muros.xrce.beginning").make_input(stream_id)
     self.inputs[stream_id] = made
     return made
 
@@ -53,7 +53,7 @@ def defer(self: "Session", writer: "Any", message: "Outgoing", n: int) -> bool:
         if self.state != _CONNECTED or writer.todo:
             dropped(self, _OFFLINE, _PROBLEM_OFFLINE, n, writer)
             return False
-        if n + 2 * _HEAD <= writer.stream.mtu - len(self.head):
+        if n + _HEAD <= writer.stream.capacity:
             dropped(self, _FULL, _PROBLEM_FULL, n, writer)
             return False
     taken: bool = borrow("muros.client.requests").keep(self).defer(writer, message, n)

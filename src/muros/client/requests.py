@@ -1,7 +1,7 @@
 """Requests of a session, in its reliable stream. Boards borrow this."""
 
 from muros.compat import borrow, const
-from muros.xrce.requests import head, reserve
+from muros.xrce.requests import head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -16,9 +16,9 @@ def submit(
     n = 4 + len(payload)
     stream = self.reliable
     backlog = self.backlog
-    at = -1 if backlog is not None and backlog.cutter is not None else reserve(stream, n)
+    at = -1 if backlog is not None and backlog.cutter is not None else stream.place(n)
     if at < 0:
-        if n <= stream.mtu - stream._start - 4:
+        if n <= stream.capacity:
             return False
         data = bytearray(4 + n)
         head(data, 0, kind, flags, n, request, object_id)
@@ -26,6 +26,7 @@ def submit(
         return keep(self).first(data)
     head(stream.buf, at, kind, flags, n, request, object_id)
     stream.buf[at + 8 : at + 4 + n] = payload
+    stream.commit(at, n)
     return True
 
 

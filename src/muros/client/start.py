@@ -4,9 +4,7 @@ from array import array
 
 from muros.client.chance import draw
 from muros.compat import MPY, const
-from muros.xrce.beginning import begin
-from muros.xrce.inputs import make as make_input
-from muros.xrce.outputs import make as make_output
+from muros.xrce.beginning import begin, make_input, make_output
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:

@@ -1,14 +1,20 @@
-"""A session's core when it is made and begins again; its control messages. See ``session``. Boards borrow this."""
+"""A session's core and its streams when they are made. See ``session`` and ``streams``. Boards borrow this."""
+
+from array import array
 
 from muros.compat import const
+from muros.xrce.resetting import reset_input, reset_output
+from muros.xrce.streams import Input, Output
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
-    from muros.xrce._types import Buffer, Handle, Send
+    from muros.xrce._types import Handle, Send
     from muros.xrce.session import SessionCore
 
+_HEAD = const(4)
 _LITTLE_ENDIAN = const(0x01)
 _SESSION_NONE = const(0x80)
+_STREAM_RELIABLE = const(0x80)
 _CONTROL = const(8)
 _LONGEST_CONTROL = const(28)  # with the header of the submessage
 
@@ -28,25 +34,59 @@ def begin(
     self.head = bytearray((session_id, 0, 0, 0))
     if session_id < _SESSION_NONE:
         self.head += key or bytes(4)
+    self.body = len(self.head)
     self.send = send
     self.inputs = {}
     self.outputs = {}
     self.now = self.malformed = self.foreign = self.probe = 0
     self.largest = largest
     self._handle = handle
-    self._control = bytearray(_CONTROL - len(self.head)) + self.head + bytes(_LONGEST_CONTROL)
+    self._control = bytearray(_CONTROL - self.body) + self.head + bytes(_LONGEST_CONTROL)
     self._control[_CONTROL + 1] = _LITTLE_ENDIAN
 
 
-def stranger(self: "SessionCore", buf: "Buffer", at: int) -> None:
-    """The peer acknowledges what was never sent; ``at`` is where the ACKNACK says what."""
-    self.malformed += 1
-    self.foreign += 1
+def make_output(
+    stream_id: int,
+    mtu: int,
+    head: bytearray,
+    history: int = 1,
+    period: int = 0,
+    made: "Output | None" = None,
+) -> "Output":
+    """A sender. ``head`` is the session's header: session id, stream, number, and the key if it has one.
+
+    ``history`` (a power of two) messages may wait to be sent and acknowledged. With an ``mtu`` of 0 there is no
+    buffer to reserve in. ``made`` is a sender of another class.
+    """
+    if history & history - 1 or not 0 < history <= 0x4000:
+        raise ValueError("history is %d: it must be a power of two up to 16384" % history)
+    made = made or Output()
+    made.stream_id = stream_id
+    made.reliable = stream_id >= _STREAM_RELIABLE
+    made.mtu = mtu
+    made.history = history
+    made.period = period
+    made.due = made.resends = 0
+    made.buf = bytearray(mtu * history)
+    made._sizes = array("H", bytes(2 * history))
+    made._start = len(head)
+    made.capacity = mtu - made._start - _HEAD
+    for at in range(0, len(made.buf), mtu or 1):
+        made.buf[at : at + made._start] = head
+        made.buf[at + 1] = stream_id
+    reset_output(made)
+    return made
 
 
-def flush(self: "SessionCore", now: int) -> None:
-    """Sends what was built on any stream and not sent, and the HEARTBEATs that are due."""
-    from muros.xrce import session
-
-    for stream_id in self.outputs:
-        session.flush(self, self.outputs[stream_id], now)
+def make_input(stream_id: int, mtu: int = 0, window: int = 1) -> "Input":
+    """A receiver, reliable when its id is: then messages that come early are kept, less than ``window`` of them, each
+    up to ``mtu`` bytes."""
+    made = Input()
+    made.stream_id = stream_id
+    made.reliable = stream_id >= _STREAM_RELIABLE
+    made.mtu = mtu
+    made.window = window
+    made.lost = 0
+    made.early = {}
+    reset_input(made)
+    return made

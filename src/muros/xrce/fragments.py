@@ -11,8 +11,7 @@ from muros.xrce.session import submessages
 _FRAGMENT = const(13)
 _LITTLE_ENDIAN = const(0x01)
 _LAST_FRAGMENT = const(0x02)
-_LATER = const(2)
-_DONE = const(-1)
+_TORN = const(-1)
 _HEAD = const(4)
 
 TYPE_CHECKING = const(0)
@@ -30,58 +29,39 @@ class Joiner:
 
     reliable = False
 
-    def __init__(self, limit: int, stream_id: int = 0) -> None:
+    def __init__(self, limit: int, stream_id: int) -> None:
         self.limit = limit
         self.stream_id = stream_id
-        self.clear()
-
-    def clear(self) -> None:
-        """Ready for the next submessage."""
+        self.size = 0  # bytes so far
         self.data = bytearray()
-        self.whole = False
-        self.at = 0  # where handling goes on in data
-        self.too_long = 0  # bytes of a submessage that is being passed over
-        self.torn = False  # a piece of the submessage was given up by its sender
-
-    def add(self, buf: "Buffer", off: int, n: int, last: int) -> bool:
-        """Takes a piece; whether ``data`` is now a whole submessage."""
-        if self.whole:
-            return True  # asked again about the same last piece
-        if self.torn:
-            return False
-        if self.too_long or len(self.data) + n > self.limit:
-            self.too_long += len(self.data) + n
-            self.data = bytearray()
-        else:
-            self.data += memoryview(buf)[off : off + n]
-            self.whole = bool(last)
-        return self.whole
 
     def take(
         self, session: "SessionCore", stream: "Input", buf: "Buffer", off: int, n: int, last: int
-    ) -> int:
-        """Takes a piece for ``session`` and handles what is whole with it; ``LATER`` when that has to wait.
+    ) -> None:
+        """Takes a piece for ``session``, and handles what is whole with it.
 
         Behind the last piece ``stream`` has no use for the joiner any more.
         """
-        if self.add(buf, off, n, last):
-            held = submessages(session, self.data, self.at, len(self.data), self)
-            if held != _DONE:
-                self.at = held
-                return _LATER
-        elif last:
-            session.malformed += 1
-            if self.too_long:
-                session.too_long(stream.stream_id, self.too_long)
+        n += self.size
+        if n > self.limit:
+            self.data = bytearray()
+        else:
+            self.data += memoryview(buf)[off : off + n - self.size]
+        self.size = n
         if last:
+            if n <= self.limit:
+                self.limit = _TORN  # should handling it fail, the last piece comes again and is passed over
+                submessages(session, self.data, 0, n, self)
+            else:
+                session.malformed += 1
+                if self.limit != _TORN:
+                    session.too_long(stream.stream_id, n)
             stream.fragments = None
-        return 0
 
     def tear(self) -> None:
-        """Messages are missing now: a submessage that has begun is passed over to its end."""
-        torn = self.torn or self.too_long > 0 or (len(self.data) > 0 and not self.whole)
-        self.clear()
-        self.torn = torn
+        """Messages are missing now: the submessage is passed over to its end."""
+        self.limit = _TORN
+        self.data = bytearray()
 
 
 class Cutter:
@@ -95,9 +75,7 @@ class Cutter:
         """Puts as many pieces into ``stream`` as it has room for; whether the last one is in."""
         total = len(self.data)
         while self.done < total:
-            n = stream.mtu - stream._start - _HEAD
-            if n > total - self.done:
-                n = total - self.done
+            n = min(stream.capacity, total - self.done)
             at = stream.place(n)
             if at < 0:
                 return False

@@ -10,7 +10,7 @@ there will be more.
 """
 
 from muros.compat import const, ticks_diff
-from muros.xrce.session import submessages, tell
+from muros.xrce.session import number_at, tell
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -19,10 +19,8 @@ if TYPE_CHECKING:
     from muros.xrce.streams import Input, Output
 
 _ACKNACK = const(10)
-_LITTLE_ENDIAN = const(0x01)
 _STREAM_RELIABLE = const(0x80)
 _BITS = const(16)
-_DONE = const(-1)
 _HOLD_OFF = const(20)
 
 
@@ -38,36 +36,18 @@ def go_on(session: "SessionCore", stream: "Input", buf: "Buffer", off: int, n: i
     """Handles what is in order now and acknowledges: first the expected message, which is the one that is kept or
     else ``buf[off:off + n]``, then those kept behind it. What a submessage sets off may lead back here; the outer
     call goes on then."""
-    if not stream.busy:
-        stream.busy = True
-        try:
-            while True:
-                number = stream.expected
-                if number in stream.early:
-                    buf = stream.early[number]
-                    off = 0
-                    n = len(buf)
-                elif n == 0:
-                    break
-                at = submessages(session, buf, off + (stream.resume_at or len(session.head)), off + n, stream)
-                if not stream.busy:
-                    break  # a submessage has reset the streams: number 0 comes next
-                if stream.expected == number:  # no HEARTBEAT in the message gave it up
-                    if at != _DONE:
-                        keep(stream, number, buf, off, n)
-                        stream.resume_at = at - off
-                        break
-                    advance(stream, 1)
-                n = 0
-        finally:
-            stream.busy = False
-    acknowledge(session, stream)
-
-
-def hold(session: "SessionCore", stream: "Input", buf: "Buffer", off: int, n: int, at: int) -> None:
-    """Keeps the expected message, to be gone on with behind its first ``at`` bytes."""
-    keep(stream, stream.expected, buf, off, n)
-    stream.resume_at = at
+    while not stream.busy:
+        number = stream.expected
+        if number in stream.early:
+            buf = stream.early[number]
+            off = 0
+            n = len(buf)
+        elif n == 0:
+            break
+        if not session.take_next(stream, buf, off, n):
+            return
+        stream.early.pop(number, None)
+        n = 0
     acknowledge(session, stream)
 
 
@@ -84,54 +64,36 @@ def heartbeat(session: "SessionCore", buf: "Buffer", at: int) -> None:
         tell(session, _ACKNACK, stream_id, 0, 0)
         return
     stream = session.inputs.get(stream_id) or session.make_input(stream_id)
-    if stream is None:
-        return
-    flags = buf[at - 3] & _LITTLE_ENDIAN  # tells which of the two bytes comes first
-    announce(
-        stream,
-        buf[at + flags] << 8 | buf[at + 1 - flags],
-        buf[at + 2 + flags] << 8 | buf[at + 3 - flags],
-    )
-    go_on(session, stream, buf, 0, 0)
+    if stream is not None:
+        announce(stream, number_at(buf, at, 0), number_at(buf, at, 2))
+        go_on(session, stream, buf, 0, 0)
 
 
 def accept(stream: "Input", number: int, buf: "Buffer", off: int, n: int) -> bool:
-    """Whether a message is to be handled now. One that came early is kept, others are dropped."""
+    """Whether a message is to be handled now. One that came early is kept, others are dropped; what is longer than the
+    MTU or the heap is sent again."""
     ahead = number - stream.expected & 0xFFFF
     if ahead >= stream.window:
         return False
     if ahead >= stream.known:
         stream.known = ahead + 1
-    if ahead:
-        keep(stream, number, buf, off, n)
-    return ahead == 0
-
-
-def keep(stream: "Input", number: int, buf: "Buffer", off: int, n: int) -> None:
-    """Keeps a message that came early, or is held; what is longer than the MTU or the heap is sent again."""
-    if n <= stream.mtu and number not in stream.early:
+    if ahead and n <= stream.mtu and number not in stream.early:
         try:
             stream.early[number] = bytes(memoryview(buf)[off : off + n])
         except MemoryError:
             pass
-
-
-def advance(stream: "Input", count: int) -> None:
-    """The next ``count`` messages are handled or given up."""
-    stream.expected = stream.expected + count & 0xFFFF
-    stream.known = max(stream.known - count, 0)
-    stream.resume_at = 0
-    if stream.early:
-        for number in list(stream.early):
-            if number - stream.expected & 0x8000:
-                del stream.early[number]
+    return ahead == 0
 
 
 def announce(stream: "Input", first: int, last: int) -> None:
     """The peer keeps the messages ``first`` to ``last`` and has given up what came before."""
     count = first - stream.expected & 0xFFFF
     if 0 < count < 0x8000:
-        advance(stream, count)
+        stream.expected = first
+        stream.known = max(stream.known - count, 0)
+        for number in list(stream.early):
+            if number - first & 0x8000:
+                del stream.early[number]
         if stream.fragments is not None:
             stream.fragments.tear()
     count = last + 1 - stream.expected & 0xFFFF

@@ -1,24 +1,99 @@
-"""The reliable streams of a host with many sessions: messages are bytes, held only while they wait.
+"""What sessions of hosts have beside those of boards: submessages that wait, and reliable streams that are queues.
 
-Same rules and numbers as in ``streams``; a session that is idle holds nothing. A sender may be given
-more than its window: the rest waits in order, so that nothing accepted is lost.
+A handler that answers ``LATER`` holds the stream: this submessage and what follows on the stream stays unacknowledged
+until ``resume`` is called, which is how a slow reader pushes back on a writer. What is left of the message is kept like
+one that came early.
+
+The streams have the same rules and numbers as in ``streams``, for a host with many sessions: messages are bytes, held
+only while they wait, and a session that is idle holds nothing. A sender may be given more than its window: the rest
+waits in order, so that nothing accepted is lost.
 """
 
 from collections import deque
+from typing import TYPE_CHECKING, Any
 
-from muros.xrce._types import Send
-from muros.xrce.mending import go_on
-from muros.xrce.outputs import begin
-from muros.xrce.resetting import reset_output
-from muros.xrce.session import SessionCore
+from muros.xrce import session as core
+from muros.xrce._types import Buffer, Handle, Send
+from muros.xrce.beginning import begin, make_output
+from muros.xrce.constants import HANDLED, LATER
+from muros.xrce.fragments import Joiner
+from muros.xrce.mending import acknowledge, go_on
+from muros.xrce.resetting import reset_input, reset_output
 from muros.xrce.streams import Output
+
+if TYPE_CHECKING:
+    from muros.xrce.streams import Input
 
 _FRAGMENT = 13
 _LITTLE_ENDIAN = 0x01
 _LAST_FRAGMENT = 0x02
+_HEAD = 4
 
 
-def resume(session: SessionCore, stream_id: int, now: int) -> None:
+class HostSession(core.SessionCore):
+    """A session whose handler may also answer ``LATER``, and ``FAILED``.
+
+    ``stop_at_failure``: the rest of a message is not handled behind a submessage that failed (what the reference agent
+    does).
+    """
+
+    stop_at_failure = True
+
+    def begin(self, session_id: int, key: bytes | None, send: Send, handle: Handle, largest: int) -> None:
+        """Sets up a session; arguments as for ``beginning.begin``."""
+        begin(self, session_id, key, send, self._judge, largest)
+        self._answer = handle
+
+    def flush(self, now: int) -> None:
+        """Sends what was built on any stream and not sent, and the HEARTBEATs that are due."""
+        for stream in self.outputs.values():
+            core.flush(self, stream, now)
+
+    def reset(self) -> None:
+        """All streams, both ways, begin again; what they keep is dropped."""
+        for stream in self.inputs.values():
+            reset_input(stream)
+        for stream in self.outputs.values():
+            stream.reset()
+
+    def stranger(self, buf: Buffer, at: int) -> None:
+        """The peer acknowledges what was never sent; ``at`` is where the ACKNACK says what."""
+        self.malformed += 1
+
+    def take_next(self, stream: "Input", buf: Buffer, off: int, n: int) -> bool:
+        """As in ``SessionCore``."""
+        number = stream.expected
+        try:
+            return super().take_next(stream, buf, off, n)
+        except _LaterError as later:
+            if stream.expected == number:  # no HEARTBEAT in the message gave it up
+                stream.early[number] = bytes(buf[off : off + self.body]) + bytes(buf[later.at : off + n])
+                stream.known = max(stream.known, 1)
+        acknowledge(self, stream)
+        return False
+
+    def _on_fragment(self, stream: "Input", buf: Buffer, at: int, n: int, last: int) -> None:
+        held: Any = stream.fragments
+        if isinstance(held, _Held) and held.limit < 0:
+            stream.fragments = None  # the message with the last piece was given up
+        try:
+            super()._on_fragment(stream, buf, at, n, last)
+        except _LaterError as later:
+            held = stream.fragments
+            stream.fragments = _Held(stream.stream_id, held.data[later.at :])
+            raise _LaterError(at - _HEAD) from None
+
+    def _judge(self, kind: int, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
+        result = self._answer(kind, flags, buf, off, n, stream_id)
+        if result == LATER:
+            stream = self.inputs.get(stream_id)
+            if stream is not None and stream.busy:
+                raise _LaterError(off - _HEAD)
+            return LATER  # on no stream, or on one that was reset meanwhile
+        return result if self.stop_at_failure else HANDLED
+
+
+def resume(session: HostSession, stream_id: int, now: int) -> None:
     """Goes on with a stream of ``session`` that was held by ``LATER``."""
     stream = session.inputs.get(stream_id)
     if stream is not None and stream.expected in stream.early and not stream.busy:
@@ -26,11 +101,45 @@ def resume(session: SessionCore, stream_id: int, now: int) -> None:
         go_on(session, stream, b"", 0, 0)
 
 
-class QueuedBestEffortOutput(Output):
+class _LaterError(Exception):
+    """A submessage, whose header is at ``at``, has to wait."""
+
+    def __init__(self, at: int) -> None:
+        self.at = at
+
+
+class _Held(Joiner):
+    """What is left of a joined submessage that waits."""
+
+    def __init__(self, stream_id: int, data: bytearray) -> None:
+        super().__init__(0, stream_id)
+        self.data = data
+
+    def take(
+        self, session: core.SessionCore, stream: "Input", buf: Buffer, off: int, n: int, last: int
+    ) -> None:
+        """Its last piece comes again: goes on with it."""
+        core.submessages(session, self.data, 0, len(self.data), self)
+        stream.fragments = None
+
+
+class QueuedOutput(Output):
+    """What both kinds share."""
+
+    def idle(self) -> bool:
+        """Whether everything is sent and acknowledged."""
+        return self.first == self.next
+
+    def reset(self) -> None:
+        """Begins again with number 0."""
+        reset_output(self)
+
+
+class QueuedBestEffortOutput(QueuedOutput):
     """Sends each submessage at once, in a message of its own."""
 
     def __init__(self, stream_id: int, mtu: int, head: bytearray) -> None:
-        begin(self, stream_id, 0, head)
+        make_output(stream_id, 0, head, made=self)
         self.mtu = mtu
         self._head = head
 
@@ -46,13 +155,13 @@ class QueuedBestEffortOutput(Output):
         return True
 
 
-class QueuedReliableOutput(Output):
+class QueuedReliableOutput(QueuedOutput):
     """Keeps messages until they are acknowledged, ``history`` of them in flight, the others waiting."""
 
     def __init__(self, stream_id: int, mtu: int, head: bytearray, history: int, period: int) -> None:
         self._kept: deque[bytes] | None = None
         self._waiting: deque[bytes] | None = None
-        begin(self, stream_id, 0, head, history, period)
+        make_output(stream_id, 0, head, history, period, self)
         self.mtu = mtu
         self._head = head
 
@@ -97,7 +206,7 @@ class QueuedReliableOutput(Output):
 
     def reset(self) -> None:
         """Begins again with number 0; every kept or waiting message is dropped."""
-        reset_output(self)
+        super().reset()
         self._kept = self._waiting = None
 
     def _append(self, submessage: bytes, send: Send, now: int) -> None:

@@ -1,18 +1,6 @@
 """Submessages with ids, as they are put into streams now and then. Boards borrow this."""
 
-from muros.compat import const
-
-TYPE_CHECKING = const(0)
-if TYPE_CHECKING:
-    from muros.xrce.streams import Output
-
-
-def reserve(self: "Output", n: int) -> int:
-    """``place`` and ``commit`` for what is certain to be written."""
-    at = self.place(n)
-    if at >= 0:
-        self.commit(at, n)
-    return at
+from struct import pack_into
 
 
 def head(buf: bytearray, at: int, kind: int, flags: int, n: int, request: int, object_id: int) -> None:
@@ -22,11 +10,4 @@ def head(buf: bytearray, at: int, kind: int, flags: int, n: int, request: int, o
     """
     if n > 0xFFFF:
         n = 0
-    buf[at] = kind
-    buf[at + 1] = flags
-    buf[at + 2] = n & 255
-    buf[at + 3] = n >> 8
-    buf[at + 4] = request >> 8
-    buf[at + 5] = request & 255
-    buf[at + 6] = object_id >> 8
-    buf[at + 7] = object_id & 255
+    pack_into(">BBHHH", buf, at, kind, flags, n >> 8 | (n & 255) << 8, request, object_id)

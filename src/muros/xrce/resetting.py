@@ -1,6 +1,6 @@
 """Streams begin again with number 0. Boards borrow this."""
 
-from muros.compat import MPY, const
+from muros.compat import const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -10,13 +10,10 @@ if TYPE_CHECKING:
 
 def reset(self: "SessionCore") -> None:
     """All streams of a session, both ways, begin again; what they keep is dropped."""
-    for stream_id in self.inputs:
-        reset_input(self.inputs[stream_id])
-    for stream_id in self.outputs:
-        if MPY:
-            reset_output(self.outputs[stream_id])
-        else:  # those of hosts have more to drop
-            self.outputs[stream_id].reset()
+    for stream in self.inputs.values():
+        reset_input(stream)
+    for stream in self.outputs.values():
+        reset_output(stream)
 
 
 def reset_output(self: "Output") -> None:
@@ -26,7 +23,7 @@ def reset_output(self: "Output") -> None:
 
 def reset_input(self: "Input") -> None:
     """Expects number 0 again; kept messages are dropped."""
-    self.expected = self.known = self.resume_at = 0
+    self.expected = self.known = 0
     self.early.clear()
     self.busy = False
     self.fragments = None

@@ -11,18 +11,17 @@ holds; ``flush`` hands every message not sent yet to ``send(buf, off, n)``. A re
 peer acknowledges it; while any is unacknowledged it is ``due`` to say so in a HEARTBEAT every ``period`` ms. A
 best-effort sender is one that takes each message for acknowledged when it is sent.
 
-Here is what runs for each message as long as none is lost. Boards borrow the rest: ``outputs`` makes senders and asks
-them, ``inputs`` keeps messages that come early and sends again what was lost. Hosts with many sessions use the
-subclasses of ``queues``, which hold messages only while they wait.
+Here is what runs for each message as long as none is lost. Boards borrow the rest: ``beginning`` makes streams, and
+``mending`` keeps messages that come early and sends again what was lost. Hosts with many sessions use the subclasses of
+``queues``, which hold messages only while they wait.
 """
 
-from muros.compat import const, lend, ticks_add
+from muros.compat import const, ticks_add
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from array import array
 
-    from muros.xrce import outputs, resetting
     from muros.xrce._types import Send
     from muros.xrce.fragments import Joiner
 
@@ -30,7 +29,7 @@ _HEAD = const(4)
 
 
 class Output:
-    """A stream as its sender sees it, reliable when its id is; ``outputs`` makes it."""
+    """A stream as its sender sees it, reliable when its id is; ``beginning`` makes it."""
 
     if TYPE_CHECKING:
         stream_id: int
@@ -44,20 +43,11 @@ class Output:
         sent: int  # the first message that was never sent
         next: int  # the first message that is not begun
         resends: int
+        capacity: int  # the longest payload in bytes that a message of its own can carry
         _start: int  # where the submessages of a message begin
         _sizes: "array[int]"  # the bytes of each message, by its slot
         _again: int  # bit i: message first + i was sent again at _again_at
         _again_at: int
-
-        reset = resetting.reset_output
-        reserve = outputs.reserve
-        capacity = outputs.capacity
-        idle = outputs.idle
-        unacknowledged = outputs.unacknowledged
-    else:
-
-        def __getattr__(self, name):
-            return lend(self, "muros.xrce.outputs", name)
 
     def place(self, n: int) -> int:
         """The offset in ``buf`` where a submessage with ``n`` bytes of payload can be written; -1 for nowhere now.
@@ -69,13 +59,10 @@ class Output:
         at = self._sizes[slot]
         if number == self.sent or (at + 3 & ~3) + _HEAD + n > self.mtu:  # the last message takes no more
             at = self._start
-            if at + _HEAD + n > self.mtu or number - self.first & 0xFFFF >= self.history:
+            if n > self.capacity or number - self.first & 0xFFFF >= self.history:
                 return -1
             slot = number & self.history - 1
         slot *= self.mtu
-        if at == self._start:
-            self.buf[slot + 2] = number & 255
-            self.buf[slot + 3] = number >> 8
         while at & 3:
             self.buf[slot + at] = 0
             at += 1
@@ -103,8 +90,12 @@ class Output:
     def transmit(self, number: int, end: int, send: "Send") -> None:
         """Sends the messages from ``number`` to before ``end``."""
         while number != end:
-            slot = number & self.history - 1
-            send(self.buf, slot * self.mtu, self._sizes[slot])
+            at = number & self.history - 1
+            n = self._sizes[at]
+            at *= self.mtu
+            self.buf[at + 2] = number & 255
+            self.buf[at + 3] = number >> 8
+            send(self.buf, at, n)
             number = number + 1 & 0xFFFF
 
     def acknowledge(self, first: int, send: "Send", now: int) -> bool:
@@ -120,8 +111,8 @@ class Output:
 
 
 class Input:
-    """A stream as its receiver sees it, reliable when its id is; ``inputs`` makes it and knows what to do with it when
-    messages come early or are missing."""
+    """A stream as its receiver sees it, reliable when its id is; ``beginning`` makes it, and ``mending`` knows what to
+    do with it when messages come early or are missing."""
 
     if TYPE_CHECKING:
         stream_id: int
@@ -132,6 +123,5 @@ class Input:
         early: "dict[int, bytes]"  # messages that are kept, by their numbers
         expected: int  # the number handled next
         known: int  # how many messages from there on were seen or announced
-        resume_at: int  # where handling of the expected message goes on, if it is held
         busy: bool  # a message of it is being handled
         fragments: "Joiner | None"  # while a sample comes in pieces
