@@ -12,7 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-from muros.client import Session, TimeSync, ping
+from muros.client import Session, TimeSync, making, ping
 from muros.client._types import Deliver
 from muros.client.closing import leave
 from muros.client.link import CONNECTED
@@ -268,7 +268,7 @@ class Puppet:
         session = self.session
         writer = SimpleNamespace(
             session=session,
-            stream=Held(session.output(stream_id & 0x80)),
+            stream=Held(making.output(session, stream_id & 0x80)),
             id=object_id,
             todo=0,
             status=0,

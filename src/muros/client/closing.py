@@ -1,8 +1,10 @@
 """The end of a session: it takes leave of its agent. Boards borrow this."""
 
+from struct import pack_into
+
 from muros.client.link import WAITING, enter
 from muros.compat import borrow, const
-from muros.xrce.requests import head
+from muros.xrce.session import control
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -12,18 +14,17 @@ if TYPE_CHECKING:
     from muros.xrce._types import Buffer
 
 _DELETE = const(3)
-_LITTLE_ENDIAN = const(0x01)
 _OBJECT_CLIENT = const(0xFFFE)
 _REQUEST_LOGOUT = const(2)
-_CONTROL = const(8)
+_PAYLOAD = const(12)  # where that of a control message lies
 _ATTEMPTS = const(10)
 _PATIENCE = const(100)  # ms for each attempt
 
 
 def leave(session: "Session") -> None:
     """Asks the agent once to delete the session."""
-    head(session._control, _CONTROL, _DELETE, _LITTLE_ENDIAN, 4, _REQUEST_LOGOUT, _OBJECT_CLIENT)
-    session.send(session._control, _CONTROL - len(session.head), len(session.head) + 8)
+    pack_into(">HH", session._control, _PAYLOAD, _REQUEST_LOGOUT, _OBJECT_CLIENT)
+    control(session, _DELETE, 4)
 
 
 def close(session: "Session") -> None:

@@ -11,7 +11,10 @@ Time is two integers, seconds and nanoseconds: a board's numbers are too short f
 Boards borrow this; functions with ``self`` are methods of ``timesync.TimeSync``.
 """
 
+from struct import pack_into, unpack_from
+
 from muros.compat import const, ticks_diff, ticks_us
+from muros.xrce.session import control
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -19,7 +22,7 @@ if TYPE_CHECKING:
     from muros.xrce._types import Buffer
 
 _TIMESTAMP = const(14)
-_CONTROL = const(8)
+_PAYLOAD = const(12)  # where that of a control message lies
 _MILLION = const(1_000_000)
 _BILLION = const(1_000_000_000)
 
@@ -29,14 +32,9 @@ def request(self: "TimeSync", now: "int | None" = None) -> None:
     if now is None:
         now = ticks_us()
     self._asked = now
-    self._waiting = True
     session = self.session
-    out = session._control
-    out[_CONTROL] = _TIMESTAMP
-    out[_CONTROL + 2] = 8
-    _put(out, _CONTROL + 4, now // _MILLION)
-    _put(out, _CONTROL + 8, now % _MILLION * 1000)
-    session.send(out, _CONTROL - len(session.head), len(session.head) + 12)
+    pack_into("<II", session._control, _PAYLOAD, now // _MILLION, now % _MILLION * 1000)
+    control(session, _TIMESTAMP, 8)
 
 
 def error(self: "TimeSync", now: "int | None" = None) -> int:
@@ -51,17 +49,13 @@ def error(self: "TimeSync", now: "int | None" = None) -> int:
 def reply(self: "TimeSync", buf: "Buffer", off: int, n: int, now: int) -> None:
     """Takes a TIMESTAMP_REPLY: when it left the agent, when our request came there, our stamp."""
     asked = self._asked
-    if (
-        n < 24
-        or not self._waiting
-        or _get(buf, off + 16) != asked // _MILLION
-        or _get(buf, off + 20) != asked % _MILLION * 1000
-    ):
+    if asked is None or n < 24:
+        return
+    seconds, nanoseconds, came, came_ns, stamp, stamp_ns = unpack_from("<6I", buf, off)
+    if stamp != asked // _MILLION or stamp_ns != asked % _MILLION * 1000:
         return  # the answer to another request, or one that the network doubled
-    self._waiting = False
-    seconds = _get(buf, off)
-    nanoseconds = _get(buf, off + 4)
-    held = (seconds - _get(buf, off + 8)) * _MILLION + (nanoseconds - _get(buf, off + 12)) // 1000
+    self._asked = None
+    held = (seconds - came) * _MILLION + (nanoseconds - came_ns) // 1000
     round_trip = ticks_diff(now, asked) - held
     if held < 0 or round_trip < 0 or nanoseconds >= _BILLION:
         return  # the agent's clock was set meanwhile, or this is nonsense
@@ -79,12 +73,3 @@ def reply(self: "TimeSync", buf: "Buffer", off: int, n: int, now: int) -> None:
 
 def _error(self: "TimeSync", exchange: "tuple[int, int, int, int]", now: int) -> int:
     return (exchange[0] + 1) // 2 + ticks_diff(now, exchange[1]) * self.drift // _MILLION + 1
-
-
-def _put(buf: bytearray, at: int, value: int) -> None:
-    for i in range(4):
-        buf[at + i] = value >> (8 * i) & 255
-
-
-def _get(buf: "Buffer", at: int) -> int:
-    return buf[at] | buf[at + 1] << 8 | buf[at + 2] << 16 | buf[at + 3] << 24

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from muros.client.session import Session
 
 _SESSION_NONE = const(0x80)
+_LIVELINESS = b"\7\0\0\0uxr_hl\0\0\7\0\0\0%06d\0\0"  # a property, padded for whatever follows
+_ATTEMPT = b"\x09\0\0\0muros_id\0\0\0\0\x09\0\0\0%02x%02x%02x%02x\0\0"
 
 
 def hello(session: "Session") -> bytes:
@@ -21,22 +23,17 @@ def hello(session: "Session") -> bytes:
     With ``properties`` the attempt becomes the property ``muros_id``, by which an agent tells a repetition from a new
     beginning. ``hard_liveliness`` in ms, up to 999999, becomes the property ``uxr_hl``.
     """
-    if not session.attempt:
-        session.attempt = draw(4)
     properties = []
     if session.hard_liveliness:
-        properties.append(("uxr_hl", "%06d" % session.hard_liveliness))
-    if session.properties:
-        properties.append(("muros_id", "%02x%02x%02x%02x" % tuple(session.attempt)))
+        properties.append(_LIVELINESS % session.hard_liveliness)
+    if session.attempt is not None:
+        session.attempt = session.attempt or draw(4)
+        properties.append(_ATTEMPT % tuple(session.attempt))
     body = b"XRCE\1\0\1\x0f" + session.key + session.head[:1]
     if properties:
-        body += b"\1\0\0" + pack("<I", len(properties))
-        for pair in properties:
-            for text in pair:
-                body += bytes(-len(body) & 3) + pack("<I", len(text) + 1) + text.encode() + b"\0"
-        body += bytes(len(body) & 1)
+        body += b"\1\0\0" + pack("<I", len(properties)) + b"".join(properties)
     else:
         body += b"\0"
-    body += pack("<H", session.mtu)
+    body += pack("<H", session.reliable.mtu)
     head = b"\x80\0\0\0" if session.head[0] >= _SESSION_NONE else b"\0\0\0\0" + session.key
     return head + pack("<BBH", 0, 1, len(body)) + body

@@ -88,6 +88,11 @@ class Session(board.Session):
             self.destroy_timeout = patience
         _remember(self)
 
+    @property
+    def mtu(self) -> int:
+        """The longest message either way, in bytes."""
+        return self.reliable.mtu
+
     def participant(self, name: str, domain: int = 0) -> board.Entity:
         """A DDS participant; see ``methods``."""
         with self._making():

@@ -15,8 +15,11 @@ is acknowledged and later messages came, or says ``_FOREIGN`` times in a row wha
 old acknowledgement may be under way, the session connects again. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.2,
 8.3.5 and 8.4.
 
-Boards borrow this: it is the ``guide`` of a session until that is connected and steady.
+Boards borrow this: it is the ``guide`` of a session until that is connected and steady. As programs may ask for the
+names of states before there is a session, what sessions keep is not imported at the top.
 """
+
+from struct import pack_into
 
 from muros.compat import MPY, borrow, const, ticks_add, ticks_diff
 
@@ -52,7 +55,7 @@ _LITTLE_ENDIAN = const(0x01)
 _OBJECT_AGENT = const(0xFFFD)
 _OBJECT_CLIENT = const(0xFFFE)
 _STREAM_RELIABLE = const(0x80)
-_CONTROL = const(8)
+_PAYLOAD = const(12)  # where that of a control message lies
 _SOON = const(250)  # ms between attempts while an agent is expected back
 _SLOWLY = const(5000)  # ms until a refused session asks again
 _TRIES = const(4)  # unanswered attempts to connect again until we wait
@@ -61,45 +64,30 @@ _FOREIGN = const(8)
 
 _PROBLEM_SESSION = const(1)
 _PROBLEM_OUT_OF_STEP = const(2)
-_PROBLEM_UNREACHABLE = const(9)
 
 
 def turn(session: "Session", now: int) -> None:
     """Does what there is to do for the connection, and gives the session back when it is steady."""
     if not session.up and not session.login and session.state != LOST:
         happened(session, _SILENT)
-    if session.login:
-        if _is_due(session, now, session.retry if session.state == WAITING else _SOON):
-            _connect(session)
-    elif session.state == LOST:
-        if _is_due(session, now, _SOON):
-            session.ask()
+    if session.login or session.state == LOST:
+        _attempt(session, now)
+        return
+    if session.foreign >= _FOREIGN and ticks_diff(now, session.suspected) >= _OLDEST:
+        session.foreign = 0
+        happened(session, _UNKNOWN)
+        session.problem(_PROBLEM_OUT_OF_STEP)
     else:
-        if session.foreign >= _FOREIGN and ticks_diff(now, session.suspected) >= _OLDEST:
-            session.foreign = 0
-            happened(session, _UNKNOWN)
-            session.problem(_PROBLEM_OUT_OF_STEP)
-        else:
-            session.watch(now)
-        if session.login or session.state == LOST:
-            return
-        if session.pending:
-            borrow("muros.client.creating").work(session, now)
-        if session.pending == 0 and session.state == CONNECTING:
-            happened(session, _MADE)
-        if session.pending == 0 and session.state == CONNECTED and session.foreign < _FOREIGN:
-            session.guide = None
-
-
-def deadline(session: "Session", now: int) -> int:
-    """Milliseconds from ``now`` until the next turn is wanted."""
-    if session.login or session.state == LOST or session._ping:
-        left = 0 if session._due is None else ticks_diff(session._due, now)
-    else:
-        left = session.keepalive - ticks_diff(now, session._heard) if session.keepalive else _SLOWLY
+        session.watch(now)
+    if session.login or session.state == LOST:
+        return
     if session.pending:
-        left = min(left, ticks_diff(session.late, now)) if session.asked else 0
-    return left
+        borrow("muros.client.creating").work(session, now)
+    if session.pending == 0:
+        if session.state == CONNECTING:
+            happened(session, _MADE)
+        if session.foreign < _FOREIGN:
+            session.guide = None
 
 
 def happened(session: "Session", event: int) -> None:
@@ -112,16 +100,11 @@ def happened(session: "Session", event: int) -> None:
     enter(session, new)
 
 
-def silent(session: "Session") -> None:
-    """The agent did not answer."""
-    happened(session, _SILENT)
-
-
 def enter(session: "Session", state: int) -> None:
     """Is in a state, and tells when it is a new one."""
     if state != session.state:
         session.state = state
-        if state == CONNECTED:
+        if state == CONNECTED and session.trouble:
             session.trouble = None
         if session.on_state is not None:
             session.on_state(state)
@@ -129,26 +112,25 @@ def enter(session: "Session", state: int) -> None:
 
 def answer(session: "Session", kind: int, buf: "Buffer", off: int, n: int) -> None:
     """Takes a submessage that has to do with the connection."""
-    if kind == _STATUS:
-        if n >= 6 and buf[off + 2] << 8 | buf[off + 3] == _OBJECT_CLIENT:
-            session.login = True  # the agent has taken our leave
-        elif n >= 6 and session.asked:
-            borrow("muros.client.creating").status(
-                session, buf[off] << 8 | buf[off + 1], buf[off + 2] << 8 | buf[off + 3], buf[off + 4]
-            )
-    elif kind == _INFO:
-        if n >= 6 and session._ping and (buf[off] << 8 | buf[off + 1]) == session._ping:
-            happened(session, _KNOWN if buf[off + 5] else _UNKNOWN)
-    elif kind == _STATUS_AGENT:
+    if kind == _STATUS_AGENT:
         if n >= 2:
             _on_status_agent(session, buf[off])
-    elif kind == _GET_INFO and n >= 4:
-        out = session._control
-        out[_CONTROL] = _INFO
-        out[_CONTROL + 2] = 8
-        for i in range(8):
-            out[_CONTROL + 4 + i] = buf[off + i] if i < 4 else 0
-        session.send(out, _CONTROL - len(session.head), len(session.head) + 12)
+    elif n >= 6:
+        request = buf[off] << 8 | buf[off + 1]
+        number = buf[off + 2] << 8 | buf[off + 3]
+        if kind == _GET_INFO:
+            from muros.xrce.session import control
+
+            pack_into(">HHI", session._control, _PAYLOAD, request, number, 0)
+            control(session, _INFO, 8)
+        elif kind == _INFO:
+            if session._ping and request == session._ping:
+                happened(session, _KNOWN if buf[off + 5] else _UNKNOWN)
+        elif kind == _STATUS:
+            if number == _OBJECT_CLIENT:
+                session.login = True  # the agent has taken our leave
+            elif session.asked:
+                borrow("muros.client.creating").status(session, request, number, buf[off + 4])
 
 
 def stranger(session: "Session", buf: "Buffer", at: int) -> None:
@@ -184,30 +166,27 @@ def _suspect(session: "Session") -> None:
     submit(session, _GET_INFO, _LITTLE_ENDIAN, session.number(), _OBJECT_AGENT, b"\2\0\0\0")
 
 
-def _is_due(session: "Session", now: int, again: int) -> bool:
-    """Whether the next attempt is due and the transport open; if so, the one after comes in ``again`` ms."""
+def _attempt(session: "Session", now: int) -> None:
+    """Tries to reach the agent, when that is due, to have it accept us or to ask whether it still knows us."""
     if session._due is not None and ticks_diff(now, session._due) < 0:
-        return False
+        return
     if not MPY:
         session.attempting(now)
-    session._due = ticks_add(now, again)
+    session._due = ticks_add(now, _SOON if session.state else session.retry)
+    try:
+        session.up = session.up or bool(session.transport.open())
+    except OSError as error:
+        session.gone(error)
     if not session.up:
-        try:
-            session.up = bool(session.transport.open())
-        except OSError as error:
-            session.problem(_PROBLEM_UNREACHABLE, 0, error)
-            return False
-    return session.up
-
-
-def _connect(session: "Session") -> None:
-    if session.state == CONNECTING:
+        return
+    if not session.login:
+        session.ask()
+    elif session.state == CONNECTING and session._tries == _TRIES:
+        happened(session, _SILENT)
+    else:
         session._tries += 1
-        if session._tries > _TRIES:
-            happened(session, _SILENT)
-            return
-    message = borrow("muros.client.hello").hello(session)
-    session.send(message, 0, len(message))
+        message = borrow("muros.client.hello").hello(session)
+        session.send(message, 0, len(message))
 
 
 def _on_status_agent(session: "Session", status: int) -> None:
@@ -215,7 +194,8 @@ def _on_status_agent(session: "Session", status: int) -> None:
         _suspect(session)  # the network repeated our CREATE_CLIENT
     elif status < 0x80:
         session.login = False
-        session.attempt = b""
+        if session.attempt:
+            session.attempt = b""
         session.foreign = session.probe = 0
         session._heard = session.now
         borrow("muros.client.creating").accepted(session)

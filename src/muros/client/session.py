@@ -7,17 +7,17 @@ takes boards borrow: ``link`` leads the connection (the ``guide``, held until ev
 
 from struct import pack_into
 
-from muros.compat import borrow, const, lend, loans, release, sleep_ms, ticks_add, ticks_diff, ticks_ms
-from muros.xrce.session import SessionCore, flush
+from muros.compat import borrow, const, lend, release, sleep_ms, ticks_add, ticks_diff, ticks_ms
+from muros.xrce.session import SessionCore, control, flush
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from array import array
     from collections.abc import Callable
-    from typing import Any, Unpack
+    from typing import Any
 
     from muros.client import entities, making, methods
-    from muros.client._types import OnData, Options, Outgoing, Transport
+    from muros.client._types import OnData, Outgoing, Transport
     from muros.client.backlog import Backlog
     from muros.client.qos import Qos
     from muros.xrce._types import Buffer
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _CONNECTED = const(2)
 _LOST = const(3)
+_SILENT = const(2)  # an event, see ``link``
 _GET_INFO = const(2)
 _STATUS_AGENT = const(4)
 _INFO = const(6)
@@ -34,7 +35,7 @@ _TIMESTAMP_REPLY = const(15)
 _LITTLE_ENDIAN = const(0x01)
 _OBJECT_AGENT = const(0xFFFD)
 _FIRST_REQUEST = const(10)
-_CONTROL = const(8)
+_PAYLOAD = const(12)  # where that of a control message lies
 _FOREIGN = const(8)
 _NEVER = const(5000)
 
@@ -64,12 +65,14 @@ class Session(SessionCore):
     raised: "Exception | None" = None  # what a callback raised
     guide: "Any" = None  # the module ``link`` while there is more to do than to watch
     backlog: "Backlog | None" = None
+    create: "Any" = None  # makes representations that are not binary
+    hard_liveliness = 0
+    trouble: "tuple[str, int | None] | None" = None  # what was told that keeps us from the agent
     on_state: "Callable[[int], object] | None" = None
     on_problem: "Callable[[int, str], object] | None" = None
 
     if TYPE_CHECKING:
         transport: "Transport"
-        mtu: int
         state: int
         request: int  # behind the request id that was used last
         login: bool  # the agent has yet to accept us
@@ -84,13 +87,9 @@ class Session(SessionCore):
         laps: int  # how often that was in vain
         counts: "array[int]"  # the next index for each kind of object
         key: bytes
-        attempt: bytes  # what names the attempt to connect
+        attempt: "bytes | None"  # what names the attempt to connect, empty until it is made
         suspected: int  # the tick since which the agent seems to be out of step
-        create: "Any"  # makes representations that are not binary
-        trouble: "tuple[str, int | None] | None"  # what was told that keeps us from the agent
         queue: int
-        properties: bool
-        hard_liveliness: int
         retry: int
         creation_timeout: int
         keepalive: int
@@ -110,7 +109,6 @@ class Session(SessionCore):
         ping = methods.ping
         close = methods.close
         index = making.index
-        output = making.output
         make_input = methods.make_input
         too_long = methods.too_long
         dropped = methods.dropped
@@ -119,25 +117,14 @@ class Session(SessionCore):
         defer = methods.defer
         gone = methods.gone
         attempting = methods.attempting
-
-        def __init__(
-            self,
-            transport: "Transport",
-            client_key: "int | bytes | None" = None,
-            session_id: int = 0x81,
-            mtu: int = 0,
-            history: int = 4,
-            **options: "Unpack[Options]",
-        ) -> None:
-            pass
     else:
-
-        def __init__(self, *given, **options):
-            borrow("muros.client.start").start(self, *given, **options)
-            release()
 
         def __getattr__(self, name):
             return lend(self, "muros.client.methods", name)
+
+    def __init__(self, *given: "Any", **options: "Any") -> None:
+        borrow("muros.client.start").start(self, *given, **options)
+        release()
 
     def spin_once(self, now: "int | None" = None) -> int:
         """Takes what has come and does what is due; returns the number of messages taken. Never waits.
@@ -173,7 +160,7 @@ class Session(SessionCore):
             self._due = ticks_add(now, self.ping_timeout)
             self._tries += 1
             if self._tries > self.ping_attempts:
-                self.lead().silent(self)
+                self.lead().happened(self, _SILENT)
             else:
                 self.ask()
 
@@ -181,11 +168,8 @@ class Session(SessionCore):
         """Asks the agent whether it knows the session."""
         if self._ping == 0:
             self._ping = self.number()
-        buf = self._control
-        buf[_CONTROL] = _GET_INFO
-        buf[_CONTROL + 2] = 8
-        pack_into(">HHI", buf, _CONTROL + 4, self._ping, _OBJECT_AGENT, 0x02000000)
-        self.send(buf, _CONTROL - len(self.head), len(self.head) + 12)
+        pack_into(">HHI", self._control, _PAYLOAD, self._ping, _OBJECT_AGENT, 0x02000000)
+        control(self, _GET_INFO, 8)
 
     def number(self, count: int = 1) -> int:
         """A request id, the first of ``count`` in a row."""
@@ -205,22 +189,19 @@ class Session(SessionCore):
     def deadline(self, now: int) -> int:
         """Milliseconds from ``now`` until ``spin_once`` has something to do of its own accord."""
         left = _NEVER
-        if self.guide is not None:
-            left = self.guide.deadline(self, now)
-        elif self.pending:
-            left = 0
-        elif self._ping:
-            left = ticks_diff(self._due, now)  # type: ignore[arg-type]
+        if self.login or self.state == _LOST or self._ping:
+            left = 0 if self._due is None else ticks_diff(self._due, now)
         elif self.keepalive:
             left = self.keepalive - ticks_diff(now, self._heard)
+        if self.pending:
+            left = min(left, ticks_diff(self.late, now)) if self.asked else 0
         if self.reliable.first != self.reliable.next:
             left = min(left, ticks_diff(self.reliable.due, now))
         return max(left, 1)
 
     def deliver(self, buf: "Buffer", off: int, n: int) -> None:
         """Takes a message of the transport."""
-        size = len(self.head)
-        if self.login and (n <= size or buf[off + size] != _STATUS_AGENT):
+        if self.login and (n <= self.body or buf[off + self.body] != _STATUS_AGENT):
             return  # it is about the streams of the session that was
         if self.receive(buf, off, n, self.now):
             self._heard = self.now
@@ -287,23 +268,38 @@ class Entity:
         """
         session = self.session
         n = message.size()
-        if self.todo == 0 and session.state == _CONNECTED and session.backlog is None:
-            at = self.stream.place(n + 4)
-            if at >= 0:
-                _head(self, at, n + 4)
-                message.write(self.stream.buf, at + 8)
-                self.stream.commit(at, n + 4)
-                self.stream.flush(session.send, session.now)
-                return True
+        if (
+            self.todo == 0
+            and session.state == _CONNECTED
+            and session.backlog is None
+            and put(self, message, n)
+        ):
+            return True
         return session.defer(self, message, n)
+
+
+def put(writer: Entity, message: "Outgoing", n: int) -> bool:
+    """Sends a message of ``n`` bytes; False when the writer's stream has no room for it.
+
+    Boards call functions with more local names than here through their heap.
+    """
+    n += 4
+    stream = writer.stream
+    at = stream.place(n)
+    if at < 0:
+        return False
+    _head(writer, stream.buf, at, n)
+    message.write(stream.buf, at + 8)
+    stream.commit(at, n)
+    stream.flush(writer.session.send, writer.session.now)
+    return True
 
 
 def _turn(session: Session, now: int) -> None:
     """Does what the connection needs. When there is no room for the guide, there may be at the next turn."""
     try:
         if session.guide is None and session.up and session.pending == 0 and session.foreign < _FOREIGN:
-            if loans:
-                release()
+            release()
             session.watch(now)
         else:
             session.lead().turn(session, now)
@@ -322,15 +318,14 @@ def _receive(session: Session) -> int:
     return 0
 
 
-def _head(entity: Entity, at: int, n: int) -> None:
+def _head(writer: Entity, buf: bytearray, at: int, n: int) -> None:
     """Writes the header of a WRITE_DATA."""
-    buf = entity.stream.buf
     buf[at] = _WRITE_DATA
     buf[at + 1] = _LITTLE_ENDIAN
     buf[at + 2] = n & 255
     buf[at + 3] = n >> 8
-    n = entity.session.number()
+    n = writer.session.number()
     buf[at + 4] = n >> 8
     buf[at + 5] = n & 255
-    buf[at + 6] = entity.id >> 8
-    buf[at + 7] = entity.id & 255
+    buf[at + 6] = writer.id >> 8
+    buf[at + 7] = writer.id & 255

@@ -53,13 +53,12 @@ def start(
     self.inputs[_STREAM_RELIABLE] = make_input(_STREAM_RELIABLE, mtu, history)
     self.transport = transport
     self._deliver = self.deliver  # taking a method from its object costs a board memory each time
-    self.mtu = mtu
     self.request = _FIRST_REQUEST
     self.login = True
     self.up = False
     self.state = self._heard = self._tries = self._ping = self.pending = self.laps = 0
-    self._due = self.trouble = self.create = None
-    self.attempt = b""
+    self._due = None
+    self.attempt = b"" if properties else None
     self.drops = array("I", bytearray(20))
     self.entities = []
     self.objects = {}
@@ -70,10 +69,10 @@ def start(
     self.keepalive = keepalive
     self.ping_timeout = ping_timeout
     self.ping_attempts = ping_attempts
-    self.properties = properties
-    self.hard_liveliness = hard_liveliness
     self.retry = retry
     self.creation_timeout = creation_timeout
+    if hard_liveliness:
+        self.hard_liveliness = hard_liveliness
     if creation != "binary":
         from muros.xrce import create_text
 

@@ -41,8 +41,7 @@ class TimeSync:
         self._kept = kept
         self._exchanges: "list[tuple[int, int, int, int]]" = []  # round trip, tick, seconds, nanoseconds
         self._best: "tuple[int, int, int, int]" = (0, 0, 0, 0)
-        self._asked = 0
-        self._waiting = False
+        self._asked: "int | None" = None  # the tick of the request that is open
         session.objects[-_TIMESTAMP_REPLY] = self._on_reply
 
     def synchronized(self) -> bool:

@@ -43,7 +43,7 @@ class Epoch:
             if not asked and session.up and not session.login:
                 clock.request()
                 asked = True
-            elif asked and not clock._waiting:
+            elif asked and clock._asked is None:
                 return clock.synchronized()
             session.wait(min(left, session.deadline(ticks())))
             left = most - ticks_diff(ticks(), start)
