@@ -30,6 +30,7 @@ class Context:
         running: bool
         clock: "Callable[[], int]"  # what timers and executors go by
 
+        begin = contexts.begin
         node = contexts.node
         on_state = contexts.on_state
         on_problem = contexts.on_problem
@@ -41,7 +42,7 @@ class Context:
             return lend(self, "muros.rclc.contexts", name)
 
     def __init__(self, way: "Any", client_key: "int | bytes | None" = None, domain_id: int = 0) -> None:
-        borrow("muros.rclc.contexts").begin(self, way, client_key, domain_id)
+        self.begin(way, client_key, domain_id)
 
     @property
     def state(self) -> str:
@@ -64,6 +65,7 @@ class Node:
         entities: "list[Entity]"
         participant: "Any"
 
+        begin = node.begin
         publisher = node.publisher
         subscription = node.subscription
         timer = node.timer

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from muros.rclc import handles
+    from muros.rclc import handles, periods
     from muros.rclc.context import Context
 
 _TIMEOUT = const(1000)  # ms that one round of ``spin`` waits at most
@@ -34,6 +34,9 @@ class Executor:
     """
 
     stopped = False
+    period = 0.0  # ms
+    let: "Any" = None
+    due: "Any" = None  # when the period ends
 
     def __init__(
         self,
@@ -50,16 +53,13 @@ class Executor:
             self.begin(options)
 
     if TYPE_CHECKING:
-        period: float  # ms
         on_error: "Any"
-        let: "Any"
-        due: "Any"  # when the period ends
 
-        begin = handles.begin
+        begin = periods.begin
         add = handles.add
         remove = handles.remove
-        spin_one_period = handles.spin_one_period
-        spin_period = handles.spin_period
+        spin_one_period = periods.spin_one_period
+        spin_period = periods.spin_period
         stop = handles.stop
     else:
 
@@ -105,6 +105,8 @@ class Executor:
                 handle.run(now)
                 ran = True
         return ran
+
+    beat = work  # what is due without news, too
 
 
 class Handle:

@@ -8,16 +8,11 @@ if TYPE_CHECKING:
     from typing import Any
 
     from muros.rclc.client import Client
-    from muros.rclc.executor import Executor, Handle
+    from muros.rclc.executor import Executor
     from muros.rclc.timer import Timer
 
 _TIMEOUT = const(10)  # seconds
 _ON_NEW_DATA = const(0)
-
-
-def begin(self: "Executor", options: "dict[str, Any]") -> None:
-    """Sets up an executor that is given more than handles and a trigger."""
-    borrow("muros.rclc.periods").begin(self, options)
 
 
 def add(
@@ -38,7 +33,7 @@ def add(
         self.handles = []
     borrow("muros.rclc.handle_error").check_new(self, handle)
     handle.eager = self.trigger is None
-    if when or hasattr(self, "let"):
+    if when or self.let is not None:
         borrow("muros.rclc.periods").prepare(self, handle, when, let, messages)
     _leave(handle)
     if callback is not None:
@@ -58,28 +53,14 @@ def stop(self: "Executor") -> None:
     self.stopped = True
 
 
-def spin_period(self: "Executor", period: float = 0) -> None:
-    """Makes one pass each ``period`` seconds until the context is closed or ``stop`` is called.
-
-    Late ones are caught up. The period may be that of the executor.
-    """
-    borrow("muros.rclc.periods").spin_period(self, period)
-
-
-def spin_one_period(self: "Executor", period: float = 0) -> None:
-    """Makes one pass and waits for the end of the period: the first begins now, each other where the last has ended."""
-    borrow("muros.rclc.periods").spin_one_period(self, period)
-
-
-def destroy(self: "Handle") -> None:
+def destroy(self: "Any") -> None:
     """Takes a handle away, with all that waits."""
     _leave(self)
     if self.entity is not None:
         self.entity.destroy()
     self.cancelled = True  # a timer
     self.depth = 0  # a service
-    for name in ("_waiting", "_answers", "_asked"):
-        getattr(self, name, []).clear()
+    self._waiting = self._answers = self._asked = []
 
 
 def exchange_period(self: "Timer", period: float) -> float:
@@ -120,6 +101,10 @@ def wait_for_service(self: "Client", timeout: float = _TIMEOUT) -> bool:
     from muros.rclc.graph import wait_for_service as wait
 
     return wait(self, timeout)
+
+
+def __getattr__(name: str) -> "Any":
+    return getattr(borrow("muros.rclc.periods"), name)
 
 
 def _leave(handle: "Any") -> None:

@@ -46,7 +46,7 @@ def prepare(executor: "Any", handle: "Any", when: int, let: float, messages: int
         from muros.rclc.handle_error import HandleError
 
         raise HandleError("%r cannot run ALWAYS: only subscriptions can" % handle)
-    own = getattr(executor, "let", None)
+    own = executor.let
     if own is not None:
         task = own.task(handle)
         task.let = int(let * 1000 + 0.5)
@@ -60,28 +60,31 @@ def prepare(executor: "Any", handle: "Any", when: int, let: float, messages: int
         executor.always.append(handle)
 
 
-def spin_period(executor: "Any", period: float) -> None:
-    """Makes one pass each ``period`` seconds, until the executor is stopped or its context closed."""
+def spin_period(executor: "Any", period: float = 0) -> None:
+    """Makes one pass each ``period`` seconds until the context is closed or ``stop`` is called.
+
+    Late ones are caught up. The period may be that of the executor.
+    """
     executor.due = None
     while executor.context.running and not executor.stopped:
         spin_one_period(executor, period)
     executor.stopped = False
 
 
-def spin_one_period(executor: "Any", period: float) -> None:
-    """Makes one pass and waits for the end of the period."""
-    ms = int(period * 1000 + 0.5) if period else getattr(executor, "period", 0)
+def spin_one_period(executor: "Any", period: float = 0) -> None:
+    """Makes one pass and waits for the end of the period: the first begins now, each other where the last has ended."""
+    ms = int(period * 1000 + 0.5) if period else executor.period
     if not ms:
         raise ValueError("spin_period needs a period: spin_period(0.01), or Executor(context, period=0.01)")
     clock = executor.context.clock
     middleware = executor.context.middleware
-    let = getattr(executor, "let", None)
-    start = getattr(executor, "due", None)
+    let = executor.let
+    start = executor.due
     if start is None:
         start = clock()
     executor.due = ticks_add(start, ms)
     if let is None:
-        getattr(executor, "beat", executor.work)(clock())
+        executor.beat(clock())
     else:
         let.period = ms
         middleware.spin_once(clock())

@@ -6,7 +6,6 @@ Ticks are milliseconds with fractions here: nothing but differences are made of 
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -56,11 +55,11 @@ class Subscription(subscription_.Subscription):
         super().__init__(context, kind, callback)
         self.depth = profile(qos).depth or _DEPTH
         self._kind = kind
-        self._waiting: deque[Any] = deque()
+        self._waiting: list[Any] = []
 
     def take(self) -> Any:
         """The oldest message that waits, or None."""
-        return self._waiting.popleft() if self._waiting else None
+        return self._waiting.pop(0) if self._waiting else None
 
     def ready(self, now: int) -> bool:
         """Whether a message waits."""
@@ -68,7 +67,7 @@ class Subscription(subscription_.Subscription):
 
     def run(self, now: int) -> None:
         """Takes a message, or None when nothing waits, and calls the callback."""
-        message = self._waiting.popleft() if self._waiting else None
+        message = self._waiting.pop(0) if self._waiting else None
         if self.callback is not None:
             self.callback(message)
 
@@ -86,7 +85,7 @@ class Subscription(subscription_.Subscription):
             if self.eager:
                 self._run_early()
             else:
-                self._waiting.popleft()
+                self._waiting.pop(0)
                 self.lost += 1
 
     def _run_early(self) -> None:
