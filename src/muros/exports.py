@@ -52,13 +52,15 @@ triggers all_of always any_of one
 """,
 }
 if not MPY:
-    from muros.compat import HOSTS
+    from muros.compat import HOSTS, names
 
     PLACES = {package: HOSTS[package] + PLACES[package] for package in PLACES}
 
 
 def find(package: str, name: str) -> object:
     """What a package calls ``name``; AttributeError for what is not there."""
+    if not MPY and name == "__all__":
+        return names(PLACES, package)
     if name == "Qos":
         package = "client"
     places = PLACES[package]

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 MTU = 64
 HANDLED, STOP, LATER = 0, 1, 2
+WRITE = 0x0107  # WRITE_DATA and its flag
 KEY = b"\xaa\xbb\xcc\xdd"
 
 
@@ -69,19 +70,18 @@ class End(SessionCore):
         at = stream.place(len(body))
         if at < 0:
             return False
-        buf = stream.buf
-        for i, byte in enumerate(submessage(7, body)):
-            buf[at + i] = byte
-        stream.commit(at, len(body))
+        for i, byte in enumerate(body):
+            stream.buf[at + 4 + i] = byte
+        stream.commit(at, WRITE, len(body))
         return True
 
     def _keep(self, buf: "Buffer", off: int, n: int) -> None:
         self.sent.append(bytes(buf[off : off + n]))
 
-    def _take(self, kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
+    def _take(self, kind: int, buf: "Buffer", off: int, n: int) -> int:
         answer = self.answers.pop(0) if self.answers else HANDLED
         if answer != LATER:
-            self.got.append((kind, bytes(buf[off : off + n]), stream_id))
+            self.got.append((kind, bytes(buf[off : off + n]), self.stream.stream_id if self.stream else 0))
         return answer
 
 
@@ -332,11 +332,11 @@ def test_a_heartbeat_in_a_message_may_give_up_that_message() -> None:
 def test_reset_in_a_message_begins_with_number_0() -> None:
     end = End()
 
-    def handle(kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
+    def handle(kind: int, buf: "Buffer", off: int, n: int) -> int:
         if kind == 12:
             reset(end)
         else:
-            end.got.append((kind, bytes(buf[off : off + n]), stream_id))
+            end.got.append((kind, bytes(buf[off : off + n]), 0x80))
         return HANDLED
 
     end._handle = handle
@@ -351,7 +351,7 @@ def test_reset_in_a_message_begins_with_number_0() -> None:
 def test_an_error_in_a_handler_does_not_block_the_stream() -> None:
     end = End()
 
-    def broken(kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
+    def broken(kind: int, buf: "Buffer", off: int, n: int) -> int:
         raise ValueError("a user's callback")
 
     end._handle, good = broken, end._handle
@@ -523,13 +523,13 @@ class Quiet(SessionCore):
     """A session that says nothing and handles everything."""
 
     def __init__(self) -> None:
-        begin(self, 0x81, None, quiet, ignore, 0)
+        begin(self, 0x81, b"", quiet, ignore, 0)
 
 
 def quiet(buf: "Buffer", off: int, n: int) -> None:
     """Sends nowhere."""
 
 
-def ignore(kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
+def ignore(kind: int, buf: "Buffer", off: int, n: int) -> int:
     """Handles everything."""
     return HANDLED

@@ -5,7 +5,7 @@ from muros.xrce.beginning import make_input, make_output
 from muros.xrce.mending import accept, announce, missing, resend
 from muros.xrce.resetting import reset_input, reset_output
 from tests.board.harness import allocates, raises
-from tests.board.test_session import End, idle, message, submessage
+from tests.board.test_session import WRITE, End, idle, message, submessage
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -44,14 +44,9 @@ def fill(stream: "Output", n: int = 8) -> bool:
     at = stream.place(n)
     if at < 0:
         return False
-    buf = stream.buf
-    buf[at] = 7
-    buf[at + 1] = 1
-    buf[at + 2] = n
-    buf[at + 3] = 0
     for i in range(n):
-        buf[at + 4 + i] = number & 255
-    stream.commit(at, n)
+        stream.buf[at + 4 + i] = number & 255
+    stream.commit(at, WRITE, n)
     return True
 
 
@@ -74,7 +69,7 @@ def take(stream: "Input", number: int) -> "list[int]":
     """One message arrives; the numbers that were handled because of it."""
     number &= 0xFFFF
     handled: "list[int]" = []
-    if accept(stream, number, bytes((number & 255, number >> 8)), 0, 2):
+    if accept(stream, number - stream.expected & 0xFFFF, bytes((number & 255, number >> 8)), 0, 2):
         handled.append(number)
         advance(stream)
         handled += kept(stream)
@@ -332,8 +327,7 @@ def test_sending_does_not_allocate() -> None:
 
     def call() -> None:
         at = stream.place(8)
-        stream.buf[at] = 7
-        stream.commit(at, 8)
+        stream.commit(at, WRITE, 8)
         stream.flush(quiet, 5)
         stream.acknowledge(stream.next, quiet, 6)
 

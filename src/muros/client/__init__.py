@@ -4,7 +4,7 @@ Names are imported when they are first used, so that a board loads only what its
 that checks more and says more.
 """
 
-from muros.compat import MPY, borrow, const
+from muros.compat import borrow, const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -22,11 +22,6 @@ if TYPE_CHECKING:
     from muros.client.timesync import TimeSync as TimeSync
     from muros.client.uart import Uart as Uart
     from muros.client.udp import Udp as Udp
-
-if not MPY:
-    from muros.compat import names
-
-    __all__ = names(borrow("muros.exports").PLACES, "client")
 
 
 def __getattr__(name: str) -> object:

@@ -10,7 +10,7 @@ The same source runs on MicroPython and on CPython. Names are imported when they
 only what its program needs. Hosts have classes that check more and say more, see ``host.context``.
 """
 
-from muros.compat import MPY, borrow, const
+from muros.compat import borrow, const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -80,11 +80,6 @@ if TYPE_CHECKING:
     from muros.rclc.triggers import always as always
     from muros.rclc.triggers import any_of as any_of
     from muros.rclc.triggers import one as one
-
-if not MPY:
-    from muros.compat import names
-
-    __all__ = names(borrow("muros.exports").PLACES, "rclc")
 
 
 def __getattr__(name: str) -> object:

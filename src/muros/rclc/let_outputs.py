@@ -1,6 +1,6 @@
 """What callbacks with logical execution time publish over a session, held back. Boards load it for those alone."""
 
-from muros.compat import borrow, const
+from muros.compat import const
 from muros.xrce.requests import head
 
 TYPE_CHECKING = const(0)
@@ -10,11 +10,9 @@ if TYPE_CHECKING:
     from muros.rclc.let import Task
 
 _CONNECTED = const(2)
-_OFFLINE = const(0)
-_FULL = const(1)
-_PROBLEM_OFFLINE = const(7)
-_PROBLEM_FULL = const(8)
-_WRITE_DATA = const(7)
+_OFFLINE = const(7)  # codes of problems
+_FULL = const(8)
+_WRITE = const(0x0107)  # a WRITE_DATA, little endian
 _HEAD = const(8)  # of a WRITE_DATA
 
 
@@ -44,7 +42,7 @@ class Outputs:
         session = self.session
         session.backlog = self._backlog
         if self.items:
-            backlog = borrow("muros.client.requests").keep(session)
+            backlog = session.keep()
             backlog.items += self.items
             self.items = []
             backlog.pump()
@@ -69,7 +67,7 @@ class Outputs:
                 % (count, count, writer.name, count + 1)
             )
         data = bytearray(_HEAD + n)
-        head(data, 0, _WRITE_DATA, 1, n + 4, self.session.number(), writer.id)
+        head(data, 0, _WRITE, n + 4, self.session.number(), writer.id)
         message.write(data, _HEAD)
         task.outputs.append((writer, data))
         return True
@@ -94,18 +92,18 @@ class Outputs:
         n = len(data) - 4
         if session.state != _CONNECTED or writer.todo:
             if writer.status or not (writer.stream.reliable and session.queue):
-                session.dropped(_OFFLINE, _PROBLEM_OFFLINE, n - 4, writer)
+                session.dropped(_OFFLINE, n - 4, writer)
                 return False
         elif not writer.stream.reliable:
             at = writer.stream.place(n)
             if at < 0:
-                session.dropped(_FULL, _PROBLEM_FULL, n - 4, writer)
+                session.dropped(_FULL, n - 4, writer)
                 return False
             writer.stream.buf[at : at + n + 4] = data
-            writer.stream.commit(at, n)
+            writer.stream.commit(at, _WRITE, n)
             writer.stream.flush(session.send, session.now)
             return True
-        backlog = borrow("muros.client.requests").keep(session)
+        backlog = session.keep()
         backlog.items.append(data)
         backlog.pump()
         return True
