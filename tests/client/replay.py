@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 from muros.client import Session, TimeSync, making, ping
 from muros.client._types import Deliver
 from muros.client.closing import leave
+from muros.client.creating import submit
 from muros.client.link import CONNECTED
 from muros.client.qos import Qos
 from muros.client.raw import Raw
-from muros.client.requests import submit
 from muros.client.session import Entity
 from muros.xrce import create, create_text
 from muros.xrce._types import Buffer

@@ -9,7 +9,6 @@ from muros.client import CONNECTED, CONNECTING, LOST, WAITING
 from muros.client import problems as problem
 from muros.client.creating import status
 from muros.client.raw import Raw
-from muros.client.requests import keep
 from tests.client.test_session import Device, kinds
 from tests.client.world import STRING, World
 
@@ -84,7 +83,7 @@ def test_replies_have_the_numbers_of_their_requests_when_ids_wrap(queue: int) ->
     client.request = LAST_REQUEST - 2
     for _ in range(6):
         if queue:
-            keep(client)  # they go through the backlog
+            client.keep()  # they go through the backlog
         sent.append(requester.send(Raw(b"q")))
         world.run(50)
     assert replies == sent == [LAST_REQUEST - 2, LAST_REQUEST - 1, LAST_REQUEST, 10, 11, 12]

@@ -85,7 +85,7 @@ compat exports
 xrce/__init__ xrce/session xrce/streams xrce/beginning xrce/resetting xrce/requests
 xrce/mending xrce/fragments xrce/create
 client/__init__ client/session client/methods client/start client/chance client/making client/names client/qos
-client/link client/hello client/creating client/entities client/requests client/backlog client/deleting
+client/link client/hello client/creating client/entities client/backlog
 client/closing client/problems client/services client/timesync client/exchange client/echo client/presence
 rclc/__init__ rclc/context rclc/contexts rclc/node rclc/errors rclc/executor rclc/handles rclc/subscription
 rclc/timer rclc/service rclc/client

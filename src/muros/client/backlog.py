@@ -7,6 +7,7 @@ anew, ``hold`` takes over every WRITE_DATA that the agent has not acknowledged (
 borrow this for as long as there is a backlog.
 """
 
+from muros.client.session import put
 from muros.compat import borrow, const
 from muros.xrce.fragments import Cutter
 from muros.xrce.requests import head
@@ -26,12 +27,9 @@ _FRAGMENT = const(13)
 _LITTLE_ENDIAN = const(0x01)
 _HEAD = const(4)
 
-_OFFLINE = const(0)
-_FULL = const(1)
-_TOO_LARGE = const(2)
-_PROBLEM_TOO_LARGE = const(6)
-_PROBLEM_OFFLINE = const(7)
-_PROBLEM_FULL = const(8)
+_TOO_LARGE = const(6)  # codes of problems
+_OFFLINE = const(7)
+_FULL = const(8)
 
 
 class Backlog:
@@ -50,27 +48,21 @@ class Backlog:
         stream = writer.stream
         ready = session.state == _CONNECTED and writer.todo == 0
         if writer.status or (not ready and not (stream.reliable and session.queue)):
-            return self._refuse(_OFFLINE, _PROBLEM_OFFLINE, writer, n)
+            return session.dropped(_OFFLINE, n, writer)
         large = n + _HEAD > stream.capacity
-        waiting = len(self.items)
-        if ready and not large and not (stream.reliable and (waiting or self._cut)):
-            at = stream.place(n + _HEAD)
-            if at >= 0:
-                self._write(stream.buf, at, writer, message, n)
-                stream.commit(at, n + _HEAD)
-                stream.flush(session.send, session.now)
-                return True
+        waits = not ready or large or (stream.reliable and (self.items or self._cut))
+        if not waits and put(writer, message, n):
+            return True
         if not stream.reliable:
-            if large:
-                return self._refuse(_TOO_LARGE, _PROBLEM_TOO_LARGE, writer, n)
-            return self._refuse(_FULL, _PROBLEM_FULL, writer, n)
-        if waiting >= (session.queue or (1 if large or self._cut else 0)):
-            return self._refuse(_FULL, _PROBLEM_FULL, writer, n)
+            return session.dropped(_TOO_LARGE if large else _FULL, n, writer)
+        if len(self.items) >= (session.queue or (1 if large or self._cut else 0)):
+            return session.dropped(_FULL, n, writer)
         if large and hasattr(message, "piece"):
             data: "Any" = borrow("muros.client.pieces").make(session, writer, message, n)
         else:
             data = bytearray(2 * _HEAD + n)
-            self._write(data, 0, writer, message, n)
+            head(data, 0, _WRITE_DATA, _LITTLE_ENDIAN, n + _HEAD, session.number(), writer.id)
+            message.write(data, 2 * _HEAD)
         self.items.append(data)
         self.pump()
         return True
@@ -151,11 +143,3 @@ class Backlog:
         if self._cut is not None and self._cut[0] == _WRITE_DATA:
             self._held.append(self._cut)
         self._cut = None
-
-    def _write(self, buf: bytearray, at: int, writer: "Any", message: "Outgoing", n: int) -> None:
-        head(buf, at, _WRITE_DATA, _LITTLE_ENDIAN, n + _HEAD, self.session.number(), writer.id)
-        message.write(buf, at + 2 * _HEAD)
-
-    def _refuse(self, cause: int, code: int, writer: "Any", n: int) -> bool:
-        self.session.dropped(cause, code, n, writer)
-        return False

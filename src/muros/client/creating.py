@@ -7,9 +7,9 @@ and left alone, the others go on. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.3
 
 from muros.client.entities import UNLIMITED, object_id, renew
 from muros.client.names import dds_type, topic_name
-from muros.client.requests import keep, submit
 from muros.compat import const, ticks_add, ticks_diff
 from muros.xrce import create as binary
+from muros.xrce.requests import head
 from muros.xrce.resetting import reset
 
 TYPE_CHECKING = const(0)
@@ -43,7 +43,7 @@ _PROBLEM_NO_ANSWER = const(5)
 def accepted(session: "Session") -> None:
     """Begins the streams again and has every entity created."""
     if session.reliable.first != session.reliable.next or session.backlog is not None:
-        keep(session).hold()
+        session.keep().hold()
     reset(session)
     session.asked.clear()
     session.pending = len(session.entities)
@@ -86,6 +86,23 @@ def status(session: "Session", request: int, number: int, status: int) -> None:
             session.problem(_PROBLEM_ENTITY, status, entity.name)
         if not entity.todo & _STEPS:
             session.pending -= 1
+
+
+def submit(
+    session: "Session", kind: int, flags: int, request: int, object_id: int, payload: "bytes | bytearray"
+) -> bool:
+    """Puts a submessage with ids into the reliable stream; False when there is no room now."""
+    stream = session.reliable
+    n = 4 + len(payload)
+    data = bytearray(8)
+    head(data, 0, kind, flags, n, request, object_id)
+    data += payload
+    at = -1 if session.backlog is not None and session.backlog.cutter is not None else stream.place(n)
+    if at >= 0:
+        stream.buf[at : at + len(data)] = data
+        stream.commit(at, n)
+        return True
+    return n > stream.capacity and session.keep().first(data)
 
 
 def _create(session: "Session", entity: "Entity", now: int) -> bool:

@@ -7,12 +7,18 @@ with ``self`` are methods of ``session.Entity``.
 """
 
 from muros.compat import borrow, const
+from muros.xrce.requests import head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.client.session import Entity
 
+_DELETE = const(3)
+_LITTLE_ENDIAN = const(0x01)
 _TOPIC = const(3)
+_GROUP = const(2)
+_UNDONE = const(0x0F)
+_REFUSED = const(0x10)
 _PARENT_BITS = const(12)
 _STEPS = b"\0\2\0\0\0\x0e\x0f\3\3"  # by kind of object
 
@@ -40,8 +46,26 @@ def object_id(self: "Entity", step: int) -> int:
 
 
 def destroy(self: "Entity") -> None:
-    """Has the agent delete the objects; the entity is not to be used any more."""
-    borrow("muros.client.deleting").destroy(self)
+    """Has the agent delete the objects, after what was written before; waits for nothing.
+
+    The entity is forgotten, and not to be used any more.
+    """
+    session = self.session
+    if self not in session.entities:
+        return
+    session.entities.remove(self)
+    session.objects.pop(self.id, None)
+    if self.todo & _UNDONE:
+        session.pending -= 1
+    self.todo = _REFUSED
+    self.status = 1
+    backlog = session.keep()
+    for step in (_TOPIC, 1, _GROUP):
+        if steps(self) >> step & 1:
+            session.asked.pop(self.request - step, None)
+            data = bytearray(8)
+            head(data, 0, _DELETE, _LITTLE_ENDIAN, 4, session.number(), object_id(self, step))
+            backlog.items.append(data)
 
 
 def write_bytes(self: "Entity", data: "bytes | bytearray") -> bool:

@@ -155,7 +155,7 @@ def _suspect(session: "Session") -> None:
     An acknowledgement that waits for number 0 may be old. The first of the two is held back until it is asked
     for, so that only an agent which has the second and lacks all before can say that the first is missing.
     """
-    from muros.client.requests import submit
+    from muros.client.creating import submit
 
     stream = session.outputs[_STREAM_RELIABLE]
     stream.flush(session.send, session.now)

@@ -11,20 +11,20 @@ if TYPE_CHECKING:
     from typing import Any
 
     from muros.client._types import Outgoing
+    from muros.client.backlog import Backlog
     from muros.client.session import Session
     from muros.xrce._types import Buffer
     from muros.xrce.streams import Input
 
 _STREAM_BEST_EFFORT = const(0x01)
 _CONNECTED = const(2)
-_OFFLINE = const(0)
-_FULL = const(1)
 _HEAD = const(4)
-_TOO_LONG = const(4)
-_PROBLEM_OFFLINE = const(7)
-_PROBLEM_FULL = const(8)
-_PROBLEM_UNREACHABLE = const(9)
-_PROBLEM_LARGEST = const(10)
+_TOO_LARGE = const(6)  # codes of problems
+_OFFLINE = const(7)
+_FULL = const(8)
+_UNREACHABLE = const(9)
+_LARGEST = const(10)
+_CAUSES = b"\2\0\1\0\4"  # where they are counted in ``drops``
 
 
 def ping(self: "Session", timeout: int = 1000, clock: "Callable[[], int]" = ticks_ms) -> bool:
@@ -47,30 +47,36 @@ def make_input(self: "Session", stream_id: int) -> "Input | None":
     return made
 
 
+def keep(self: "Session") -> "Backlog":
+    """The backlog, made at the first need."""
+    if self.backlog is None:
+        self.backlog = borrow("muros.client.backlog").Backlog(self)
+    return self.backlog
+
+
 def defer(self: "Session", writer: "Any", message: "Outgoing", n: int) -> bool:
     """What becomes of a sample that cannot go out now: it is queued, cut up, or refused and counted."""
     if self.queue == 0 and self.backlog is None:
         if self.state != _CONNECTED or writer.todo:
-            dropped(self, _OFFLINE, _PROBLEM_OFFLINE, n, writer)
-            return False
+            return dropped(self, _OFFLINE, n, writer)
         if n + _HEAD <= writer.stream.capacity:
-            dropped(self, _FULL, _PROBLEM_FULL, n, writer)
-            return False
-    taken: bool = borrow("muros.client.requests").keep(self).defer(writer, message, n)
-    return taken
+            return dropped(self, _FULL, n, writer)
+    return keep(self).defer(writer, message, n)
 
 
-def dropped(self: "Session", cause: int, code: int, n: int, what: "object" = "") -> None:
-    """Counts a sample of ``n`` bytes in ``drops``, and tells ``on_problem``."""
+def dropped(self: "Session", code: int, n: int, what: "object" = "") -> bool:
+    """Counts a sample of ``n`` bytes in ``drops``, and tells ``on_problem``. False, as it was not taken."""
+    cause = _CAUSES[code - _TOO_LARGE]
     count = self.drops[cause] + 1
     self.drops[cause] = count
     if count & count - 1 == 0:  # the 1st, 2nd, 4th, 8th...: never a flood
         self.problem(code, n, what)
+    return False
 
 
 def too_long(self: "Session", stream_id: int, n: int) -> None:
     """A sample that came was larger than ``largest``."""
-    dropped(self, _TOO_LONG, _PROBLEM_LARGEST, n)
+    dropped(self, _LARGEST, n)
 
 
 def problem(self: "Session", code: int, value: int = 0, what: "object" = "") -> None:
@@ -90,7 +96,7 @@ def stranger(self: "Session", buf: "Buffer", at: int) -> None:
 def gone(self: "Session", error: OSError) -> None:
     """There is no way to the agent any more."""
     self.up = False
-    self.problem(_PROBLEM_UNREACHABLE, 0, error)
+    self.problem(_UNREACHABLE, 0, error)
 
 
 def attempting(self: "Session", now: int) -> None:

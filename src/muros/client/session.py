@@ -112,6 +112,7 @@ class Session(SessionCore):
         make_input = methods.make_input
         too_long = methods.too_long
         dropped = methods.dropped
+        keep = methods.keep
         problem = methods.problem
         stranger = methods.stranger
         defer = methods.defer
