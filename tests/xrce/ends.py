@@ -97,8 +97,8 @@ def write(stream: Output, submessage: bytes) -> bool:
     at = stream.place(n)
     if at < 0:
         return False
-    stream.buf[at : at + len(submessage)] = submessage
-    stream.commit(at, n)
+    stream.buf[at + 4 : at + 4 + n] = submessage[4:]
+    stream.commit(at, submessage[0] | submessage[1] << 8, n)
     return True
 
 

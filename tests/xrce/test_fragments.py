@@ -98,6 +98,12 @@ def test_pieces_are_as_long_as_they_can_be() -> None:
         assert b"".join(message[head + 4 :] for message in sent) == submessage(bytes(204))
 
 
+def feed(end: End, piece: bytes, last: bool = False) -> None:
+    """A FRAGMENT comes on the reliable stream."""
+    told = bytes((13, 3 if last else 1, len(piece), 0)) + piece + b"#"
+    end._on_fragment(told, 4, len(piece), end.inputs[RELIABLE])
+
+
 @given(st.lists(st.tuples(st.binary(max_size=30), st.booleans()), max_size=30), st.integers(0, 60))
 def test_a_joiner_keeps_what_fits_and_passes_over_what_does_not(
     pieces: list[tuple[bytes, bool]], limit: int
@@ -108,7 +114,7 @@ def test_a_joiner_keeps_what_fits_and_passes_over_what_does_not(
     end.too_long = lambda stream_id, n: told.append((stream_id, n))  # type: ignore[method-assign]
     expected = b""
     for piece, last in pieces:
-        end._on_fragment(stream, b"##" + piece + b"#", 2, len(piece), last)
+        feed(end, piece, last)
         joiner = stream.fragments
         expected += piece
         if not last:
@@ -124,15 +130,15 @@ def test_a_torn_joiner_waits_for_the_end() -> None:
     end = End(hosts=True)
     stream = end.inputs[RELIABLE]
     whole = submessage(b"whole")
-    end._on_fragment(stream, whole, 0, 6, 0)
+    feed(end, whole[:6])
     stream.fragments.tear()
     stream.fragments.tear()
-    end._on_fragment(stream, b"more", 0, 4, 0)
+    feed(end, b"more")
     assert stream.fragments.data == b""
-    end._on_fragment(stream, whole, 6, 3, 2)
+    feed(end, whole[6:], last=True)
     assert (end.got, end.malformed, stream.fragments) == ([], 1, None)
-    end._on_fragment(stream, whole, 0, 6, 0)
-    end._on_fragment(stream, whole, 6, 3, 2)
+    feed(end, whole[:6])
+    feed(end, whole[6:], last=True)
     assert (end.got, end.malformed, stream.fragments) == ([b"whole"], 1, None)
 
 
@@ -147,7 +153,7 @@ def test_a_piece_that_comes_again_after_an_error_is_passed_over() -> None:
 
     end.is_busy, good = broken, end.is_busy
     with pytest.raises(ValueError, match="callback"):
-        end._on_fragment(stream, whole, 0, 9, 2)
+        feed(end, whole, last=True)
     end.is_busy = good
-    end._on_fragment(stream, whole, 0, 9, 2)
+    feed(end, whole, last=True)
     assert (end.got, end.malformed, stream.fragments) == ([], 1, None)

@@ -1,6 +1,6 @@
 """Streams that a slow reader holds, and that go on where they were. See also ``tests/board/test_session.py``."""
 
-from muros.xrce._types import Buffer, Handle
+from muros.xrce._types import Answer, Buffer
 from muros.xrce.constants import FAILED, HANDLED, LATER
 from muros.xrce.queues import HostSession, resume
 from tests.board import test_session
@@ -12,11 +12,11 @@ class End(HostSession, test_session.End):
 
     def __init__(self) -> None:
         test_session.End.__init__(self)
-        self.answer_with(self._handle)
+        self.answer_with(lambda kind, flags, buf, off, n, stream_id: self._take(kind, buf, off, n))
 
-    def answer_with(self, handle: Handle) -> None:
-        """Has ``handle`` answer submessages."""
-        self.begin(0x81, None, self.send, handle, self.largest)
+    def answer_with(self, answer: Answer) -> None:
+        """Has ``answer`` take submessages."""
+        self.begin(0x81, b"", self.send, answer, self.largest)
 
 
 def test_failure_ends_the_message_only_when_asked_to() -> None:

@@ -86,7 +86,7 @@ def acknowledge(stream: Output, first: int, bitmap: int, send: Send, now: int) -
 
 def feed(stream: Input, number: int, content: bytes) -> list[bytes]:
     """A message arrives; what is handled because of it."""
-    if not accept(stream, number & 0xFFFF, content, 0, len(content)):
+    if not accept(stream, number - stream.expected & 0xFFFF, content, 0, len(content)):
         return []
     advance(stream)
     return [content, *kept(stream)]

@@ -226,7 +226,7 @@ class AgentSession(HostSession):
         stream = self.inputs[stream_id] = make_input(stream_id, 0xFFFF, self.core.limits.window)
         return stream
 
-    def _on_fragment(self, stream: Any, buf: Buffer, at: int, n: int, last: int) -> None:
+    def _on_fragment(self, buf: Buffer, at: int, n: int, stream: Any) -> None:
         """Takes a piece, as long as what all clients have under way stays within the limit."""
         core = self.core
         joiner = stream.fragments
@@ -241,7 +241,7 @@ class AgentSession(HostSession):
                 why=f"samples that come in pieces make {core.joining} B of {core.limits.max_joining} B",
                 remedy="Find the client that begins samples and does not end them, or raise limits.max_joining.",
             )
-        super()._on_fragment(stream, buf, at, n, last)
+        super()._on_fragment(buf, at, n, stream)
         self._joins(
             sum(len(s.fragments.data) for s in self.inputs.values() if s.reliable and s.fragments is not None)
         )

@@ -15,10 +15,8 @@ if TYPE_CHECKING:
     from muros.client.session import Session
     from muros.xrce.streams import Output
 
-_WRITE_DATA = const(7)
-_FRAGMENT = const(13)
-_LITTLE_ENDIAN = const(0x01)
-_LAST_FRAGMENT = const(0x02)
+_WRITE = const(0x0107)  # a WRITE_DATA, little endian
+_LAST_PIECE = const(0x030D)  # a FRAGMENT, little endian
 _IDS = const(4)
 _HEAD = const(8)  # of a WRITE_DATA, with its ids
 
@@ -74,11 +72,7 @@ class PieceCutter(Cutter):
             at = stream.place(0)
             if at < 0:
                 return False
-            stream.commit(at, 0)
-            buf = stream.buf
-            buf[at] = _FRAGMENT
-            buf[at + 1] = _LITTLE_ENDIAN | _LAST_FRAGMENT
-            buf[at + 2] = buf[at + 3] = 0
+            stream.commit(at, _LAST_PIECE, 0)
         return True
 
     def put(self, buf: bytearray, off: int, n: int) -> None:
@@ -97,7 +91,7 @@ class PieceCutter(Cutter):
 def make(session: "Session", writer: "Any", sample: "Any", n: int) -> Pieces:
     """Takes a sample of ``n`` bytes."""
     made = Pieces(session, sample, n)
-    head(made.head, 0, _WRITE_DATA, _LITTLE_ENDIAN, n + _IDS, session.number(), writer.id)
+    head(made.head, 0, _WRITE, n + _IDS, session.number(), writer.id)
     sample.begin()
     return made
 

@@ -22,7 +22,7 @@ _LONGEST_CONTROL = const(28)  # with the header of the submessage
 def begin(
     self: "SessionCore",
     session_id: int,
-    key: "bytes | None",
+    key: bytes,
     send: "Send",
     handle: "Handle",
     largest: int,
@@ -33,7 +33,7 @@ def begin(
     """
     self.head = bytearray((session_id, 0, 0, 0))
     if session_id < _SESSION_NONE:
-        self.head += key or bytes(4)
+        self.head += key
     self.body = len(self.head)
     self.send = send
     self.inputs = {}

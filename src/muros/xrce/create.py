@@ -29,18 +29,17 @@ _KIND_DATAWRITER = const(5)
 
 def participant(name: str, domain: int) -> bytes:
     """A participant with a name, in a domain."""
-    blob = _string(b"\0\1", name)
-    return _variant(_KIND_PARTICIPANT, blob, bytes(len(blob) & 1) + pack("<h", domain))
+    return _variant(_KIND_PARTICIPANT, domain, b"\0\1", name)
 
 
 def topic(name: str, type_name: str, parent: int) -> bytes:
     """A topic of a participant, by its names in DDS (``rt/chatter``, ``std_msgs::msg::dds_::String_``)."""
-    return _variant(_KIND_TOPIC, _string(_string(b"", name) + b"\0\1", type_name), pack(">H", parent))
+    return _variant(_KIND_TOPIC, parent, name, b"\0\1", type_name)
 
 
 def group(kind: int, parent: int) -> bytes:
     """A publisher or a subscriber (``kind`` 3 or 4) of a participant."""
-    return _variant(kind, b"\0\0", pack(">H", parent))
+    return _variant(kind, parent, b"\0\0")
 
 
 def endpoint(
@@ -51,10 +50,11 @@ def endpoint(
     A depth, a deadline or a lifespan (both in ms) of 0 is left to the agent. The names of the topic are needed by
     the other formats only.
     """
-    blob = pack("<BBBxH", topic_id >> 8, topic_id & 255, 1, qos.flags)
+    blob = pack(">H", topic_id) + pack("<BxH", 1, qos.flags)
     blob += pack("<BxH", 1, qos.depth) if qos.depth else b"\0"
-    blob = _optional(_optional(blob, qos.deadline), qos.lifespan)
-    return _variant(kind, blob + bytes(2 if kind == _KIND_DATAWRITER else 3), pack(">H", parent))
+    for time in (qos.deadline, qos.lifespan):
+        blob += b"\1" + bytes(~len(blob) & 3) + pack("<I", time) if time else b"\0"
+    return _variant(kind, parent, blob, bytes(2 if kind == _KIND_DATAWRITER else 3))
 
 
 def service(
@@ -67,27 +67,21 @@ def service(
     parent: int,
 ) -> bytes:
     """A requester or a replier (``kind`` 7 or 8) of a participant, by the names of its types and topics in DDS."""
-    blob = _string(_string(_string(b"", name), request_type), reply_type)
-    blob = _string(_string(blob + b"\1", request_topic) + b"\1", reply_topic)
-    return _variant(kind, blob, pack(">H", parent))
+    return _variant(kind, parent, name, request_type, reply_type, b"\1", request_topic, b"\1", reply_topic)
 
 
 def read_data(stream_id: int, samples: int, seconds: int, bytes_per_second: int, pace: int) -> bytes:
     """What follows the ids in a READ_DATA: DATA on ``stream_id``, with delivery control (DDS-XRCE 1.0, 7.8.5.4)."""
-    return pack("<BBBBHHHH", stream_id, 0, 0, 1, samples, seconds, bytes_per_second, pace)
+    return pack("<BxxBHHHH", stream_id, 1, samples, seconds, bytes_per_second, pace)
 
 
-def _string(before: bytes, text: str) -> bytes:
-    data = text.encode()
-    return before + bytes(-len(before) & 3) + pack("<I", len(data) + 1) + data + b"\0"
-
-
-def _optional(before: bytes, value: int) -> bytes:
-    if not value:
-        return before + b"\0"
-    before += b"\1"
-    return before + bytes(-len(before) & 3) + pack("<I", value)
-
-
-def _variant(kind: int, blob: bytes, tail: bytes) -> bytes:
-    return pack("<BBxxI", kind, _IN_BINARY, len(blob)) + blob + tail
+def _variant(kind: int, parent: int, *parts: "str | bytes") -> bytes:
+    """A representation that consists of bytes and of strings; for a participant its domain stands for the parent."""
+    blob = b""
+    for part in parts:
+        if isinstance(part, str):
+            part = part.encode() + b"\0"
+            blob += bytes(-len(blob) & 3) + pack("<I", len(part))
+        blob += part
+    end = bytes(len(blob) & 1) + pack("<h", parent) if kind == _KIND_PARTICIPANT else pack(">H", parent)
+    return pack("<BBxxI", kind, _IN_BINARY, len(blob)) + blob + end

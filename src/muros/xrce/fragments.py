@@ -8,8 +8,8 @@ sample is under way.
 from muros.compat import const, copy
 from muros.xrce.session import submessages
 
-_FRAGMENT = const(13)
-_LITTLE_ENDIAN = const(0x01)
+_PIECE = const(0x010D)  # a FRAGMENT, little endian; another one follows
+_LAST_PIECE = const(0x030D)
 _LAST_FRAGMENT = const(0x02)
 _TORN = const(-1)
 _HEAD = const(4)
@@ -35,9 +35,7 @@ class Joiner:
         self.size = 0  # bytes so far
         self.data = bytearray()
 
-    def take(
-        self, session: "SessionCore", stream: "Input", buf: "Buffer", off: int, n: int, last: int
-    ) -> None:
+    def take(self, session: "SessionCore", stream: "Input", buf: "Buffer", off: int, n: int) -> None:
         """Takes a piece for ``session``, and handles what is whole with it.
 
         Behind the last piece ``stream`` has no use for the joiner any more.
@@ -48,10 +46,10 @@ class Joiner:
         else:
             self.data += memoryview(buf)[off : off + n - self.size]
         self.size = n
-        if last:
+        if buf[off - 3] & _LAST_FRAGMENT:
             if n <= self.limit:
                 self.limit = _TORN  # should handling it fail, the last piece comes again and is passed over
-                submessages(session, self.data, 0, n, self)
+                submessages(session, self.data, -session.body, n + session.body, self)
             else:
                 session.malformed += 1
                 if self.limit != _TORN:
@@ -80,13 +78,8 @@ class Cutter:
             if at < 0:
                 return False
             self.put(stream.buf, at + _HEAD, n)
-            stream.commit(at, n)
-            buf = stream.buf
-            buf[at] = _FRAGMENT
-            buf[at + 1] = _LITTLE_ENDIAN if self.done + n < total else _LITTLE_ENDIAN | _LAST_FRAGMENT
-            buf[at + 2] = n & 255
-            buf[at + 3] = n >> 8
             self.done += n
+            stream.commit(at, _PIECE if self.done < total else _LAST_PIECE, n)
         return True
 
     def put(self, buf: bytearray, off: int, n: int) -> None:

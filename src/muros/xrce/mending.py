@@ -24,9 +24,9 @@ _BITS = const(16)
 _HOLD_OFF = const(20)
 
 
-def take(session: "SessionCore", stream: "Input", number: int, buf: "Buffer", off: int, n: int) -> None:
+def take(session: "SessionCore", stream: "Input", ahead: int, buf: "Buffer", off: int, n: int) -> None:
     """Takes a message of a reliable stream that is not simply the next one."""
-    if accept(stream, number, buf, off, n):
+    if accept(stream, ahead, buf, off, n):
         go_on(session, stream, buf, off, n)
     else:
         acknowledge(session, stream)
@@ -69,14 +69,16 @@ def heartbeat(session: "SessionCore", buf: "Buffer", at: int) -> None:
         go_on(session, stream, buf, 0, 0)
 
 
-def accept(stream: "Input", number: int, buf: "Buffer", off: int, n: int) -> bool:
-    """Whether a message is to be handled now. One that came early is kept, others are dropped; what is longer than the
-    MTU or the heap is sent again."""
-    ahead = number - stream.expected & 0xFFFF
+def accept(stream: "Input", ahead: int, buf: "Buffer", off: int, n: int) -> bool:
+    """Whether the message ``ahead`` of the expected one is to be handled now.
+
+    One that came early is kept, others are dropped; what is longer than the MTU or the heap is sent again.
+    """
     if ahead >= stream.window:
         return False
     if ahead >= stream.known:
         stream.known = ahead + 1
+    number = stream.expected + ahead & 0xFFFF
     if ahead and n <= stream.mtu and number not in stream.early:
         try:
             stream.early[number] = bytes(memoryview(buf)[off : off + n])

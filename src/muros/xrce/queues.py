@@ -13,7 +13,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from muros.xrce import session as core
-from muros.xrce._types import Buffer, Handle, Send
+from muros.xrce._types import Answer, Buffer, Send
 from muros.xrce.beginning import begin, make_output
 from muros.xrce.constants import HANDLED, LATER
 from muros.xrce.fragments import Joiner
@@ -39,10 +39,13 @@ class HostSession(core.SessionCore):
 
     stop_at_failure = True
 
-    def begin(self, session_id: int, key: bytes | None, send: Send, handle: Handle, largest: int) -> None:
-        """Sets up a session; arguments as for ``beginning.begin``."""
+    def begin(self, session_id: int, key: bytes, send: Send, answer: Answer, largest: int) -> None:
+        """Sets up a session; arguments as for ``beginning.begin``.
+
+        ``answer(kind, flags, buf, off, n, stream_id)`` takes submessages.
+        """
         begin(self, session_id, key, send, self._judge, largest)
-        self._answer = handle
+        self._answer = answer
 
     def flush(self, now: int) -> None:
         """Sends what was built on any stream and not sent, and the HEARTBEATs that are due."""
@@ -72,19 +75,20 @@ class HostSession(core.SessionCore):
         acknowledge(self, stream)
         return False
 
-    def _on_fragment(self, stream: "Input", buf: Buffer, at: int, n: int, last: int) -> None:
+    def _on_fragment(self, buf: Buffer, at: int, n: int, stream: "Input") -> None:
         held: Any = stream.fragments
         if isinstance(held, _Held) and held.limit < 0:
             stream.fragments = None  # the message with the last piece was given up
         try:
-            super()._on_fragment(stream, buf, at, n, last)
+            super()._on_fragment(buf, at, n, stream)
         except _LaterError as later:
             held = stream.fragments
             stream.fragments = _Held(stream.stream_id, held.data[later.at :])
             raise _LaterError(at - _HEAD) from None
 
-    def _judge(self, kind: int, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
-        result = self._answer(kind, flags, buf, off, n, stream_id)
+    def _judge(self, kind: int, buf: Buffer, off: int, n: int) -> int:
+        stream_id = self.stream.stream_id if self.stream is not None else 0
+        result = self._answer(kind, buf[off - 3], buf, off, n, stream_id)
         if result == LATER:
             stream = self.inputs.get(stream_id)
             if stream is not None and stream.busy:
@@ -115,11 +119,9 @@ class _Held(Joiner):
         super().__init__(0, stream_id)
         self.data = data
 
-    def take(
-        self, session: core.SessionCore, stream: "Input", buf: Buffer, off: int, n: int, last: int
-    ) -> None:
+    def take(self, session: core.SessionCore, stream: "Input", buf: Buffer, off: int, n: int) -> None:
         """Its last piece comes again: goes on with it."""
-        core.submessages(session, self.data, 0, len(self.data), self)
+        core.submessages(session, self.data, -session.body, len(self.data) + session.body, self)
         stream.fragments = None
 
 

@@ -1,8 +1,8 @@
 """A session without I/O: the header of its messages, its streams and their acknowledgements, for either role.
 
 The core answers what belongs to the streams itself (ACKNACK, HEARTBEAT, FRAGMENT) and gives every other submessage
-to ``handle(kind, flags, buf, off, n, stream_id)``; where that returns a number other than 0, the rest of the message
-is passed over. Messages leave through ``send(buf, off, n)``, whose bytes are only lent.
+to ``handle(kind, buf, off, n)``, behind its header in ``buf``; where that returns a number other than 0, the rest of
+the message is passed over. Messages leave through ``send(buf, off, n)``, whose bytes are only lent.
 
 What differs between the roles are values: the heartbeat period, the windows, and whether streams a peer names come
 into being (an agent's) or not (a client's). What only hosts need is in ``queues``.
@@ -26,9 +26,7 @@ _HEARTBEAT = const(11)
 _WRITE_DATA = const(7)
 _DATA = const(9)
 _LITTLE_ENDIAN = const(0x01)
-_LAST_FRAGMENT = const(0x02)
 _HEAD = const(4)
-_FAR = const(0x3FFFFFFF)  # behind every message
 _CONTROL = const(8)  # where the submessage of a control message lies in its buffer, behind the longest header
 
 
@@ -47,6 +45,7 @@ class SessionCore:
         malformed: int
         foreign: int  # acknowledgements in a row of what was never sent
         probe: int  # the client's, see there
+        stream: "Any"  # of the submessage that is being handled; None for none
         largest: int  # the longest joined submessage taken, in bytes
         _handle: "Handle"
         _control: bytearray
@@ -68,8 +67,7 @@ class SessionCore:
         if buf[off + 1]:
             _take(self, buf, off, n)
         else:
-            n += off
-            submessages(self, buf, off + self.body, n, None)
+            submessages(self, buf, off, n, None)
         return True
 
     def mend(self) -> "Any":
@@ -83,7 +81,7 @@ class SessionCore:
         number = stream.expected
         stream.busy = True
         try:
-            submessages(self, buf, off + self.body, off + n, stream)
+            submessages(self, buf, off, n, stream)
             if stream.busy and stream.expected == number:  # neither reset nor given up meanwhile
                 stream.expected = number + 1 & 0xFFFF
                 if stream.known:
@@ -103,10 +101,10 @@ class SessionCore:
             else:
                 self.stranger(buf, at)
 
-    def _on_fragment(self, stream: "Any", buf: "Buffer", at: int, n: int, last: int) -> None:
+    def _on_fragment(self, buf: "Buffer", at: int, n: int, stream: "Any") -> None:
         if stream.fragments is None:
             stream.fragments = borrow("muros.xrce.fragments").Joiner(self.largest, stream.stream_id)
-        stream.fragments.take(self, stream, buf, at, n, last)
+        stream.fragments.take(self, stream, buf, at, n)
 
 
 # Functions, as a board finds them sooner than methods of a base class.
@@ -114,18 +112,18 @@ class SessionCore:
 
 def _take(session: SessionCore, buf: "Buffer", off: int, n: int) -> None:
     """Takes a message of a stream."""
-    number = buf[off + 2] | buf[off + 3] << 8
     stream = session.inputs.get(buf[off + 1]) or session.make_input(buf[off + 1])
     if stream is None:
         session.malformed += 1
-    elif not stream.reliable:
-        ahead = number - stream.expected & 0xFFFF
+        return
+    ahead = (buf[off + 2] | buf[off + 3] << 8) - stream.expected & 0xFFFF
+    if not stream.reliable:
         if ahead < 0x7FFF:
             stream.lost += ahead
-            stream.expected = number + 1 & 0xFFFF
-            submessages(session, buf, off + session.body, off + n, stream)
-    elif number != stream.expected or stream.known or stream.busy:
-        session.mend().take(session, stream, number, buf, off, n)
+            stream.expected = stream.expected + ahead + 1 & 0xFFFF
+            submessages(session, buf, off, n, stream)
+    elif ahead or stream.known or stream.busy:
+        session.mend().take(session, stream, ahead, buf, off, n)
     elif session.take_next(stream, buf, off, n):
         if stream.known:
             session.mend().go_on(session, stream, buf, 0, 0)
@@ -149,47 +147,44 @@ def tell(session: SessionCore, kind: int, stream_id: int, first: int, second: in
 
 
 def control(session: SessionCore, kind: int, n: int) -> None:
-    """Sends a message of one submessage, whose ``n`` bytes of payload are in place, on no stream."""
+    """Sends a submessage whose ``n`` bytes of payload are in place, in a message of no stream."""
     buf = session._control
     buf[_CONTROL] = kind
     buf[_CONTROL + 2] = n
     session.send(buf, _CONTROL - session.body, session.body + _HEAD + n)
 
 
-def submessages(session: SessionCore, buf: "Buffer", pos: int, end: int, stream: "Any") -> None:
-    """Handles the submessages from ``pos`` on. Up to 3 bytes behind the last are padding, which may hold anything."""
-    while pos <= end - _HEAD:
-        pos = _submessage(session, buf, pos + _HEAD, end, stream)
+def submessages(session: SessionCore, buf: "Buffer", off: int, n: int, stream: "Any") -> None:
+    """Handles the submessages of a message. Up to 3 bytes behind the last are padding, which may hold anything."""
+    n += off
+    off += session.body
+    while off <= n - _HEAD:
+        off += _HEAD
+        size = buf[off - 2] | buf[off - 1] << 8
+        if size == 0 and (buf[off - 4] == _WRITE_DATA or buf[off - 4] == _DATA):
+            size = n - off  # too long for the length field: it ends with the message
+        if size > n - off:
+            session.malformed += 1
+            break
+        session.stream = stream  # what was handled before may have led to other messages
+        if _submessage(session, buf, off, size):
+            break
+        off += size + 3 & ~3
 
 
-def _submessage(session: SessionCore, buf: "Buffer", at: int, end: int, stream: "Any") -> int:
-    """Handles the submessage whose payload is at ``at``; the position behind it, or behind the message when the rest of
-    that is passed over."""
-    if (buf[at - 2] | buf[at - 1] << 8) > end - at:
-        session.malformed += 1
-        return end
-    if buf[at - 2] or buf[at - 1] or (buf[at - 4] != _WRITE_DATA and buf[at - 4] != _DATA):
-        end = at + (
-            buf[at - 2] | buf[at - 1] << 8
-        )  # else it is too long for the length field: it ends with the message
-    if buf[at - 4] == _ACKNACK:
-        if end - at >= 5:
-            session._on_acknack(buf, at)
-    elif _other(session, buf, at, end - at, stream):
-        return _FAR
-    return end + (at - end & 3)
-
-
-def _other(session: SessionCore, buf: "Buffer", at: int, n: int, stream: "Any") -> int:
-    """Handles any other submessage; not 0 when the rest of the message is passed over."""
+def _submessage(session: SessionCore, buf: "Buffer", at: int, n: int) -> int:
+    """Handles a submessage; not 0 when the rest of the message is passed over."""
     kind = buf[at - 4]
-    if kind == _HEARTBEAT:
+    if kind == _ACKNACK:
+        if n >= 5:
+            session._on_acknack(buf, at)
+    elif kind == _HEARTBEAT:
         if n >= 5:
             _on_heartbeat(session, buf, at)
     elif kind != _FRAGMENT:
-        return session._handle(kind, buf[at - 3], buf, at, n, stream.stream_id if stream else 0)
-    elif stream is not None and stream.reliable:
-        session._on_fragment(stream, buf, at, n, buf[at - 3] & _LAST_FRAGMENT)
+        return session._handle(kind, buf, at, n)
+    elif session.stream is not None and session.stream.reliable:
+        session._on_fragment(buf, at, n, session.stream)
     return 0
 
 

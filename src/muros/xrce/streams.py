@@ -6,15 +6,17 @@ Theory of operation. Sequence numbers are 16 bit and compared as RFC 1982 says: 
 for ``flush``.
 
 A message is built in place: ``place(n)`` gives the offset of a submessage header with room for n bytes of payload
-behind it, and ``commit`` takes what was written there, packing as many submessages into the last message as its MTU
-holds; ``flush`` hands every message not sent yet to ``send(buf, off, n)``. A reliable sender keeps a message until the
-peer acknowledges it; while any is unacknowledged it is ``due`` to say so in a HEARTBEAT every ``period`` ms. A
-best-effort sender is one that takes each message for acknowledged when it is sent.
+behind it, and ``commit`` takes the payload that was written there, packing as many submessages into the last message
+as its MTU holds; ``flush`` hands every message not sent yet to ``send(buf, off, n)``. A reliable sender keeps a
+message until the peer acknowledges it; while any is unacknowledged it is ``due`` to say so in a HEARTBEAT every
+``period`` ms. A best-effort sender is one that takes each message for acknowledged when it is sent.
 
 Here is what runs for each message as long as none is lost. Boards borrow the rest: ``beginning`` makes streams, and
 ``mending`` keeps messages that come early and sends again what was lost. Hosts with many sessions use the subclasses of
 ``queues``, which hold messages only while they wait.
 """
+
+from struct import pack_into
 
 from muros.compat import const, ticks_add
 
@@ -68,8 +70,9 @@ class Output:
             at += 1
         return slot + at
 
-    def commit(self, at: int, n: int) -> None:
-        """What was written at a place is complete: ``flush`` sends it."""
+    def commit(self, at: int, kind: int, n: int) -> None:
+        """The payload at a place is written: ``flush`` sends it. ``kind`` has the flags from bit 8 on."""
+        pack_into("<HH", self.buf, at, kind, n)
         slot = at // self.mtu
         at %= self.mtu
         self._sizes[slot] = at + _HEAD + n
@@ -79,13 +82,12 @@ class Output:
     def flush(self, send: "Send", now: int) -> None:
         """Sends every message not sent yet."""
         number = self.sent
-        if number != self.next:
-            if number == self.first:
-                self.due = ticks_add(now, self.period)
-            self.sent = self.next
-            if not self.reliable:
-                self.first = self.next
-            self.transmit(number, self.next, send)
+        if number == self.first:
+            self.due = ticks_add(now, self.period)
+        self.sent = self.next
+        if not self.reliable:
+            self.first = self.next
+        self.transmit(number, self.next, send)
 
     def transmit(self, number: int, end: int, send: "Send") -> None:
         """Sends the messages from ``number`` to before ``end``."""
