@@ -232,12 +232,54 @@ def test_the_leader_gets_up_for_what_is_due_sooner() -> None:
 
     thread = threading.Thread(target=wait, daemon=True)
     thread.start()
-    until(lambda: gate.leading)
+    until(lambda: gate._sleeping)
+    before = gate._generation
     gate.due(ticks_ms() + 2 * LONG)
-    assert gate.leading  # it gets up before that anyway
+    assert gate._generation == before  # it gets up before that anyway
     gate.due(ticks_ms() + LONG // 2)
     thread.join(PATIENCE)
     assert not thread.is_alive()
+
+
+def test_who_is_about_to_sleep_hears_of_what_is_due_sooner() -> None:
+    gate = Turnstile()
+    looked, due = threading.Event(), threading.Event()
+
+    def wait() -> None:
+        gate.look()
+        looked.set()
+        assert due.wait(PATIENCE)
+        gate.wait(None, LONG)
+
+    thread = threading.Thread(target=wait, daemon=True)
+    assert not gate.leading  # nobody has looked
+    thread.start()
+    assert looked.wait(PATIENCE)
+    assert gate.leading
+    gate.due(ticks_ms() + 1)
+    gate.due(ticks_ms() + LONG // 2)  # the first is what counts
+    due.set()
+    thread.join(PATIENCE)
+    assert not thread.is_alive()
+
+
+def test_what_is_made_while_another_thread_is_about_to_sleep_is_asked_for(stage: Stage) -> None:
+    session = stage.session(keepalive=LONG)
+    until(lambda: session.state == CONNECTED)
+    looked, made = threading.Event(), threading.Event()
+    sleep = session.wait
+
+    def wait(timeout: int) -> None:
+        looked.set()
+        assert made.wait(PATIENCE)
+        sleep(timeout)
+
+    session.wait = wait  # type: ignore[method-assign]
+    session.wake()
+    assert looked.wait(PATIENCE)
+    session.participant("node")
+    made.set()
+    until(lambda: whole(session))
 
 
 def test_a_transport_of_ones_own_is_left_now_and_then() -> None:

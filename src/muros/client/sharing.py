@@ -9,7 +9,8 @@ when the leader has got up. A message that one thread has taken may be what anot
 moves the session's generation on and ends every wait. A thread remembers the generation it saw when it looked at the
 session last, and does not wait at all when there has been a newer one since: so nothing is missed between looking and
 waiting. What makes something due sooner than the leader meant to get up, such as the repetition of what was just
-published, wakes it.
+published, wakes it. Where another thread has looked and nobody sleeps yet, that may be missed as well: so it is kept
+for whoever leads next.
 
 A leader sleeps on the file of the transport and on a pipe, and a byte in the pipe wakes it. A transport of the user's
 own has no file that we know of: its leader gets up every 10 ms once there is more than one thread.
@@ -43,10 +44,12 @@ class Turnstile:
         self._changed = threading.Condition()  # its lock may be taken again by a signal's handler
         self._generation = 0
         self._seen = _Seen()
-        self.leading = False
-        """Whether somebody sleeps."""
+        self._sleeping = False  # whether there is a leader
         self._followers = 0
         self._end = 0  # the tick at which the leader gets up
+        self._sooner: int | None = (
+            None  # the first tick at which something is due that the next leader may not know of
+        )
         self._threads = 0
         self.several = False
         """Whether more than one thread looks at the session, or wakes those who wait."""
@@ -56,11 +59,12 @@ class Turnstile:
 
     def look(self) -> None:
         """This thread is about to look at the session."""
-        if self._seen.generation < 0:
-            with self._changed:
-                self._threads += 1
-                self.several = self.several or self._threads > 1
-        self._seen.generation = self._generation
+        self._remember(self._generation)
+
+    @property
+    def leading(self) -> bool:
+        """Whether somebody sleeps, or may be about to since another thread has looked: who must hear of what is due."""
+        return self._sleeping or self._threads > (self._seen.generation >= 0)
 
     @property
     def seen(self) -> int:
@@ -69,7 +73,7 @@ class Turnstile:
 
     def adopt(self, generation: int) -> None:
         """This thread waits in the place of one that has seen a generation."""
-        self._seen.generation = generation
+        self._remember(generation)
 
     def wake(self, others: bool = False) -> None:
         """Ends every wait, and the next one of each thread that has not looked since; from any thread.
@@ -84,23 +88,27 @@ class Turnstile:
             self.several = True
             if self._followers:
                 self._changed.notify_all()
-            if self.leading and self._pipe is not None:
+            if self._sleeping and self._pipe is not None:
                 try:
                     os.write(self._pipe[1], b"\0")
                 except BlockingIOError:
                     pass  # there is enough in it to wake anybody
 
     def due(self, tick: int) -> None:
-        """Something is due at a tick: a leader that would sleep longer gets up."""
-        if self.leading and ticks_diff(self._end, tick) > 0:
-            self.wake()
+        """Something is due at a tick: a leader that would sleep longer gets up, and so does the next one."""
+        with self._changed:
+            if not self._sleeping:
+                if self._sooner is None or ticks_diff(self._sooner, tick) > 0:
+                    self._sooner = tick
+            elif ticks_diff(self._end, tick) > 0:
+                self.wake()
 
     def wait(self, transport: Transport | None, timeout: int) -> None:
         """Waits until something may have come over the transport or ``wake`` is called, at most ``timeout`` ms."""
         with self._changed:
-            if self._seen.generation != self._generation and self.several:
+            if self._missed:
                 return
-            if self.leading:
+            if self._sleeping:
                 self.several = True
                 self._followers += 1
                 try:
@@ -108,17 +116,34 @@ class Turnstile:
                 finally:
                     self._followers -= 1
                 return
-            self.leading = True
-            self._end = ticks_add(ticks_ms(), timeout)
+            now = ticks_ms()
+            if self._sooner is not None:
+                timeout = max(0, min(timeout, ticks_diff(self._sooner, now)))
+                self._sooner = None
+            self._end = ticks_add(now, timeout)
             if self._pipe is None:
                 self._make_pipe()
+            self._sleeping = True
         try:
-            self._sleep(transport, timeout)
+            if not self._missed:  # a signal's handler may have come in between, lock or no lock
+                self._sleep(transport, timeout)
         finally:
             with self._changed:
-                self.leading = False
+                self._sleeping = False
                 if self._followers:
                     self._changed.notify_all()
+
+    @property
+    def _missed(self) -> bool:
+        """Whether something has happened since this thread looked."""
+        return self.several and self._seen.generation != self._generation
+
+    def _remember(self, generation: int) -> None:
+        if self._seen.generation < 0:
+            with self._changed:
+                self._threads += 1
+                self.several = self.several or self._threads > 1
+        self._seen.generation = generation
 
     def _sleep(self, transport: Transport | None, timeout: int) -> None:
         assert self._pipe is not None
