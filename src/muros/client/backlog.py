@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 _CONNECTED = const(2)
 _DELETE = const(3)
 _WRITE_DATA = const(7)
+_WRITE = const(0x0107)  # a WRITE_DATA, little endian
 _FRAGMENT = const(13)
-_LITTLE_ENDIAN = const(0x01)
 _HEAD = const(4)
 
 _TOO_LARGE = const(6)  # codes of problems
@@ -61,7 +61,7 @@ class Backlog:
             data: "Any" = borrow("muros.client.pieces").make(session, writer, message, n)
         else:
             data = bytearray(2 * _HEAD + n)
-            head(data, 0, _WRITE_DATA, _LITTLE_ENDIAN, n + _HEAD, session.number(), writer.id)
+            head(data, 0, _WRITE, n + _HEAD, session.number(), writer.id)
             message.write(data, 2 * _HEAD)
         self.items.append(data)
         self.pump()
@@ -100,7 +100,7 @@ class Backlog:
                     if at < 0:
                         break
                     stream.buf[at : at + len(data)] = data
-                    stream.commit(at, n)
+                    stream.commit(at, data[0] | data[1] << 8, n)
                     items.pop(0)
                     continue
             if not self.cutter.pump(stream):

@@ -17,7 +17,7 @@ _DELETE = const(3)
 _OBJECT_CLIENT = const(0xFFFE)
 _REQUEST_LOGOUT = const(2)
 _PAYLOAD = const(12)  # where that of a control message lies
-_ATTEMPTS = const(10)
+_TIMEOUT = const(1000)
 _PATIENCE = const(100)  # ms for each attempt
 
 
@@ -27,15 +27,14 @@ def leave(session: "Session") -> None:
     control(session, _DELETE, 4)
 
 
-def close(session: "Session") -> None:
-    """Deletes the session at the agent, in at most ten attempts of 100 ms, and closes the transport for good."""
+def close(session: "Session", left: int = _TIMEOUT) -> None:
+    """Deletes the session at the agent, in attempts of 100 ms for ``left`` ms, and closes the transport for good."""
 
     def deliver(buf: "Buffer", off: int, n: int) -> None:
         if n > 1 and not buf[off + 1]:  # of no stream: the agent knows no session to acknowledge in
             session.deliver(buf, off, n)
 
     transport = session.transport
-    left = getattr(session, "destroy_timeout", _ATTEMPTS * _PATIENCE)  # hosts may set it
     try:
         while not session.login and session.up:
             leave(session)
@@ -53,7 +52,6 @@ def close(session: "Session") -> None:
     session.send = closed.send
     session.up = False
     session.login = True
-    session.lead()
     enter(session, WAITING)
     if session.backlog is not None:
         borrow("muros.client.pieces").close(session.backlog)

@@ -95,12 +95,12 @@ def submit(
     stream = session.reliable
     n = 4 + len(payload)
     data = bytearray(8)
-    head(data, 0, kind, flags, n, request, object_id)
+    head(data, 0, kind | flags << 8, n, request, object_id)
     data += payload
     at = -1 if session.backlog is not None and session.backlog.cutter is not None else stream.place(n)
     if at >= 0:
         stream.buf[at : at + len(data)] = data
-        stream.commit(at, n)
+        stream.commit(at, kind | flags << 8, n)
         return True
     return n > stream.capacity and session.keep().first(data)
 

@@ -30,25 +30,25 @@ def ask(
 
     A session that is not connected yet may become so and be asked then, with ``send(session)``.
     """
-    answered: "list[bool]" = []
+    answers: "list[int]" = []
 
     def hear(buf: "Buffer", off: int, n: int) -> None:
-        if n >= 6 and buf[off] == 0 and buf[off + 1] == _REQUEST:
-            answered.append(buf[off + 5] > 0)
+        if n >= 6 and buf[off] == 0 and buf[off + 1] == _REQUEST and buf[off + 5]:
+            answers.append(n)
 
     session.objects[-_INFO] = hear
     try:
         asked = False
         start = clock()
         left = timeout
-        while left > 0 and True not in answered:
+        while left > 0 and not answers:
             session.spin_once(clock())
             if not asked and session.up and not session.login:
                 send(session)
                 asked = True
-            if True not in answered:
+            if not answers:
                 session.wait(min(left, session.deadline(clock())))
             left = timeout - ticks_diff(clock(), start)
     finally:
         del session.objects[-_INFO]
-    return True in answered
+    return len(answers) > 0

@@ -13,8 +13,7 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.client.session import Entity
 
-_DELETE = const(3)
-_LITTLE_ENDIAN = const(0x01)
+_DELETION = const(0x0103)  # a DELETE, little endian
 _TOPIC = const(3)
 _GROUP = const(2)
 _UNDONE = const(0x0F)
@@ -64,7 +63,7 @@ def destroy(self: "Entity") -> None:
         if steps(self) >> step & 1:
             session.asked.pop(self.request - step, None)
             data = bytearray(8)
-            head(data, 0, _DELETE, _LITTLE_ENDIAN, 4, session.number(), object_id(self, step))
+            head(data, 0, _DELETION, 4, session.number(), object_id(self, step))
             backlog.items.append(data)
 
 

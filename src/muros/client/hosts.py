@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from muros.client import echo, making, methods, reasons
+from muros.client import closing, echo, making, reasons
 from muros.client import session as board
 from muros.client.entities import steps
 from muros.client.link import CONNECTED
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from muros.xrce._types import Buffer
 
 _INDICES = 4096
+_PATIENCE = 1000  # ms to take leave in
 _SILENCE = 3000  # ms without an answer until that is told
 _SILENT = "silent"
 _DELETE = 3
@@ -82,10 +83,8 @@ class Session(board.Session):
         self.lock = threading.RLock()
         self._gate = Turnstile()
         self._pinging = threading.RLock()  # one at a time: they would take each other's answers
-        patience = options.pop("destroy_timeout", None)
+        self._patience = options.pop("destroy_timeout", _PATIENCE)
         super().__init__(transport, client_key, session_id, mtu, history, **options)
-        if patience is not None:
-            self.destroy_timeout = patience
         _remember(self)
 
     @property
@@ -178,7 +177,7 @@ class Session(board.Session):
         """Takes leave of the agent, for at most one second, and closes the transport."""
         self._gate.wake()
         with self.lock:
-            methods.close(self)
+            closing.close(self, self._patience)
 
     @contextmanager
     def _making(self) -> Iterator[None]:

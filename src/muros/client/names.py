@@ -27,10 +27,7 @@ def topic_name(prefix: str, name: str, suffix: str = "", limit: int = _NAME) -> 
 
     Raises ValueError when it is longer than ``limit`` characters: the agent of micro-ROS takes no more.
     """
-    made = prefix + name + suffix
-    if len(made) > limit:
-        raise ValueError("%s is too long: %d characters as %s, at most %d" % (name, len(made), made, limit))
-    return made
+    return _limited(name, prefix + name + suffix, limit)
 
 
 def dds_type(ros: str, suffix: str = "", limit: int = _TYPE) -> str:
@@ -43,9 +40,10 @@ def dds_type(ros: str, suffix: str = "", limit: int = _TYPE) -> str:
     parts = ros.split("/")
     if len(parts) != 3:
         raise ValueError("%r is no type: it should read like std_msgs/msg/String" % ros)
-    made = parts[0] + "::" + parts[1] + "::dds_::" + parts[2] + suffix + "_"
+    return _limited("type " + ros, parts[0] + "::" + parts[1] + "::dds_::" + parts[2] + suffix + "_", limit)
+
+
+def _limited(ros: str, made: str, limit: int) -> str:
     if len(made) > limit:
-        raise ValueError(
-            "type %s is too long: %d characters as %s, at most %d" % (ros, len(made), made, limit)
-        )
+        raise ValueError("%s is too long: %d characters as %s, at most %d" % (ros, len(made), made, limit))
     return made

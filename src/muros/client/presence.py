@@ -13,24 +13,19 @@ _QUESTION = b"\x80\0\0\0\x02\x01\x08\0\0\x0a\xff\xfd\x02\0\0\0"
 _INFO = const(6)
 
 
-class _Answer:
-    def __init__(self) -> None:
-        self.came = False
-
-    def deliver(self, buf: "Buffer", off: int, n: int) -> None:
-        """Looks whether a message is the answer."""
-        at = off + 8 if n >= 8 and buf[off] < 0x80 else off + 4
-        if n >= at - off + 10 and buf[at] == _INFO and buf[at + 4] == 0 and buf[at + 5] == 10:
-            self.came = True
-
-
 def ping(transport: "Transport", attempts: int = _ATTEMPTS, timeout: int = _TIMEOUT) -> bool:
     """Whether an agent answers over ``transport`` to one of ``attempts`` questions, each within ``timeout`` ms.
 
     Opens the transport and leaves it open. What else comes in meanwhile is dropped: a transport that a session uses
     is asked with ``Session.ping``.
     """
-    answer = _Answer()
+    answers: "list[int]" = []
+
+    def hear(buf: "Buffer", off: int, n: int) -> None:
+        at = off + 8 if n >= 8 and buf[off] < 0x80 else off + 4
+        if n >= at - off + 10 and buf[at] == _INFO and buf[at + 4] == 0 and buf[at + 5] == 10:
+            answers.append(n)
+
     for _ in range(attempts):
         start = ticks_ms()
         left = timeout
@@ -42,8 +37,8 @@ def ping(transport: "Transport", attempts: int = _ATTEMPTS, timeout: int = _TIME
                         transport.send(_QUESTION, 0, len(_QUESTION))
                         asked = True
                     transport.wait(left)
-                    transport.receive(answer.deliver)
-                    if answer.came:
+                    transport.receive(hear)
+                    if answers:
                         return True
                 else:
                     transport.wait(10)

@@ -17,8 +17,19 @@ TOO_LARGE = const(6)
 OFFLINE = const(7)
 FULL = const(8)
 _UNREACHABLE = const(9)
-_LARGEST = const(10)
 
+_TEXTS = (
+    "the agent refuses the session: {2}",
+    "the agent's streams began again behind our back: connecting anew",
+    "the agent refuses {0}: {2}",
+    "the agent refuses to read {0}: {2}",
+    "the agent does not answer requests to create entities; asking again",
+    "{1} B of {0} dropped: more than the MTU holds; publish reliably or raise it",
+    "{1} B of {0} dropped: no session, or the writer is not there",
+    "{1} B of {0} dropped: window or queue full",
+    "no way to the agent: {0}",
+    "{1} B dropped: more than largest",
+)
 _ERROR = const(0x80)
 _STATUS = (
     "DDS error",
@@ -36,11 +47,10 @@ def tell(session: "Session", code: int, value: int, what: "Any") -> None:
     """Tells ``on_problem``, but why there is no way to the agent only when that changes; arguments as for ``text``."""
     said = text(code, value, what)
     if code == _UNREACHABLE:
-        if session.trouble is not None and session.trouble[0] == said:
+        if said == session.trouble:
             return
-        session.trouble = (said, None)
-    if session.on_problem is not None:
-        session.on_problem(code, said)
+        session.trouble = said
+    session.on_problem(code, said)  # type: ignore[misc]
 
 
 def text(code: int, value: int, what: "Any") -> str:
@@ -48,27 +58,7 @@ def text(code: int, value: int, what: "Any") -> str:
 
     ``value`` is a status or a number of bytes; ``what`` a writer, the name of another entity, or an OSError.
     """
-    if code == SESSION:
-        return "the agent refuses the session: " + status(value)
-    if code == OUT_OF_STEP:
-        return "the agent's streams began again behind our back: connecting anew"
-    if code == ENTITY:
-        return "the agent refuses %s: %s" % (what, status(value))
-    if code == READ:
-        return "the agent refuses to read %s: %s" % (what, status(value))
-    if code == NO_ANSWER:
-        return "the agent does not answer requests to create entities; asking again"
-    if code == _UNREACHABLE:
-        return "no way to the agent: %s" % what
-    if code == _LARGEST:
-        return "%d B dropped: more than largest" % value
-    if code == TOO_LARGE:
-        why = "more than the MTU holds; publish reliably or raise it"
-    elif code == OFFLINE:
-        why = "no session, or the writer is not there"
-    else:
-        why = "window or queue full"
-    return "%d B of %s dropped: %s" % (value, what.name, why)
+    return _TEXTS[code - 1].format(getattr(what, "name", what), value, status(value))
 
 
 def status(value: int) -> str:

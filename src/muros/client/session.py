@@ -29,10 +29,9 @@ _SILENT = const(2)  # an event, see ``link``
 _GET_INFO = const(2)
 _STATUS_AGENT = const(4)
 _INFO = const(6)
-_WRITE_DATA = const(7)
+_WRITE = const(0x0107)  # a WRITE_DATA, little endian
 _DATA = const(9)
 _TIMESTAMP_REPLY = const(15)
-_LITTLE_ENDIAN = const(0x01)
 _OBJECT_AGENT = const(0xFFFD)
 _FIRST_REQUEST = const(10)
 _PAYLOAD = const(12)  # where that of a control message lies
@@ -67,7 +66,7 @@ class Session(SessionCore):
     backlog: "Backlog | None" = None
     create: "Any" = None  # makes representations that are not binary
     hard_liveliness = 0
-    trouble: "tuple[str, int | None] | None" = None  # what was told that keeps us from the agent
+    trouble: "Any" = None  # what was told that keeps us from the agent; hosts add since when
     on_state: "Callable[[int], object] | None" = None
     on_problem: "Callable[[int, str], object] | None" = None
 
@@ -207,7 +206,7 @@ class Session(SessionCore):
         if self.receive(buf, off, n, self.now):
             self._heard = self.now
 
-    def take(self, kind: int, flags: int, buf: "Buffer", off: int, n: int, stream_id: int) -> int:
+    def take(self, kind: int, buf: "Buffer", off: int, n: int) -> int:
         """Takes a submessage."""
         try:
             if kind == _DATA:
@@ -289,9 +288,9 @@ def put(writer: Entity, message: "Outgoing", n: int) -> bool:
     at = stream.place(n)
     if at < 0:
         return False
-    _head(writer, stream.buf, at, n)
+    pack_into(">HH", stream.buf, at + 4, writer.session.number(), writer.id)
     message.write(stream.buf, at + 8)
-    stream.commit(at, n)
+    stream.commit(at, _WRITE, n)
     stream.flush(writer.session.send, writer.session.now)
     return True
 
@@ -317,16 +316,3 @@ def _receive(session: Session) -> int:
     except MemoryError:
         pass  # no room for what mends streams: the message counts as lost
     return 0
-
-
-def _head(writer: Entity, buf: bytearray, at: int, n: int) -> None:
-    """Writes the header of a WRITE_DATA."""
-    buf[at] = _WRITE_DATA
-    buf[at + 1] = _LITTLE_ENDIAN
-    buf[at + 2] = n & 255
-    buf[at + 3] = n >> 8
-    n = writer.session.number()
-    buf[at + 4] = n >> 8
-    buf[at + 5] = n & 255
-    buf[at + 6] = writer.id >> 8
-    buf[at + 7] = writer.id & 255

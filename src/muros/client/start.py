@@ -40,7 +40,7 @@ def start(
     if client_key is None:
         client_key = draw(3) + bytes((draw(1)[0] | 1,))
     elif isinstance(client_key, int):
-        client_key = bytes([client_key >> shift & 255 for shift in (24, 16, 8, 0)])
+        client_key = client_key.to_bytes(4, "big")
     if len(client_key) != 4 or client_key == b"\0\0\0\0":
         raise ValueError("client_key must be 4 bytes or an integer from 1 to 0xFFFFFFFF")
     mtu = (mtu or transport.mtu) - 4
