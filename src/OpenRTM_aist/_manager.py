@@ -8,7 +8,7 @@ import os
 import sys
 import threading
 from collections.abc import Callable
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from inspect import isfunction
 from typing import Any, ClassVar
 
@@ -83,7 +83,8 @@ class Manager:
             return True
         self._started = True
         try:
-            self.core.start(lambda core: self._init(self) if self._init is not None else None)
+            with self._ended_by_signals():
+                self.core.start(lambda core: self._init(self) if self._init is not None else None)
         except RtcError as error:
             print(f"muros: {error}", file=sys.stderr)
             self._close()
@@ -96,8 +97,7 @@ class Manager:
             threading.Thread(target=self.join, name="OpenRTM_aist.Manager", daemon=True).start()
             atexit.register(self._close)
             return
-        in_main_thread = threading.current_thread() is threading.main_thread()
-        with ended_by_signals(self.core.shutdown) if in_main_thread else nullcontext():
+        with self._ended_by_signals():
             self.join()
 
     def shutdown(self) -> None:
@@ -111,6 +111,10 @@ class Manager:
         """Wait for the end."""
         self.core.wait()
         self._close()
+
+    def _ended_by_signals(self) -> AbstractContextManager[None]:
+        in_main_thread = threading.current_thread() is threading.main_thread()
+        return ended_by_signals(self.core.shutdown) if in_main_thread else nullcontext()
 
     def _close(self) -> None:
         with self._closing:

@@ -6,10 +6,12 @@ import signal
 import subprocess
 import sys
 import threading
+from typing import Any
 
 import pytest
 
-from muros.rtc.manager import ended_by_signals
+from muros.rtc.manager import _signals, ended_by_signals
+from muros.rtc.manager._signals import SIGNALS
 from tests.rtc.manager._processes import wait_until
 
 WAITING = """
@@ -22,8 +24,11 @@ with ended_by_signals(lambda: print("wish", flush=True)):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_that_comes_twice_at_once_is_one_wish(number: signal.Signals) -> None:
+def test_a_signal_that_comes_twice_at_once_is_one_wish(
+    number: signal.Signals, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """`timeout` sends its own twice; the names of components would be left behind if that ended the process."""
+    monkeypatch.setattr(_signals, "SAME_WISH", 60.0)  # however long this process is not let run in between
     ends: list[int] = []
     ended = threading.Event()
 
@@ -38,6 +43,31 @@ def test_a_signal_that_comes_twice_at_once_is_one_wish(number: signal.Signals) -
         assert ended.wait(10)
     assert ends == [number]
     assert signal.getsignal(number) is before
+
+
+@pytest.mark.parametrize("moment", ["beginning", "ending"])
+def test_no_signal_is_lost_as_it_begins_to_listen_or_ends(
+    moment: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each comes while its handler does nothing: just after it is there, or just before it goes."""
+    install = signal.signal
+    changes = 0
+    wishes: list[str] = []
+
+    def interrupted(number: signal.Signals, handler: Any) -> Any:
+        nonlocal changes
+        changes += 1
+        if moment == "ending" and changes == len(SIGNALS) + 1:
+            signal.raise_signal(number)
+        before = install(number, handler)
+        if moment == "beginning" and changes == 1:
+            signal.raise_signal(number)
+        return before
+
+    monkeypatch.setattr(signal, "signal", interrupted)
+    with ended_by_signals(lambda: wishes.append(moment)):
+        pass
+    assert wishes == [moment]
 
 
 def test_a_signal_that_another_thread_gets_counts() -> None:

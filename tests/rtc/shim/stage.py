@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -61,19 +62,17 @@ class Program:
         return status
 
     def end(self) -> int:
-        """End it by SIGTERM; its status."""
+        """End it by SIGTERM; its status. One that does not end has to say where its threads stand."""
         if self.process.stdin is not None and not self.process.stdin.closed:
             self.process.stdin.close()
         if self.process.poll() is None:
             self.process.terminate()
         try:
-            return self.process.wait(PATIENCE)
+            return self.over()
         except subprocess.TimeoutExpired:
-            self.process.kill()
-            raise
-        finally:
-            self.process.wait()
-            self._reader.join(PATIENCE)
+            self.process.send_signal(signal.SIGABRT)
+            self.over()
+            raise AssertionError("\n".join(("it does not end, and says:", *self.lines))) from None
 
     def _read(self) -> None:
         assert self.process.stdout is not None
@@ -166,6 +165,7 @@ class Stage:
         return {
             **os.environ,
             "OMNIORB_CONFIG": os.devnull,
+            "PYTHONFAULTHANDLER": "1",
             "PYTHONUNBUFFERED": "1",
             "RTCTREE_NAMESERVERS": self.names,
             "XDG_CACHE_HOME": str(self.folder / "cache"),

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import RTC
+from muros.rtc.corba import NameServer, Orb
 from OpenRTM_aist import CORBA_RTCUtil
 from tests.rtc.shim.stage import COMPONENTS, Program, Stage, wait_for
 
@@ -195,4 +196,30 @@ def test_a_component_that_starts_itself(stage: Stage) -> None:
     program.said("listener loop 5")
     program.said("received 105")
     program.said("finished SelfStarter0")
-    assert program.end() == 0
+    # All that may have happened before its main thread came to `runManager`: so it is no signal that ends it.
+    assert stage.component("SelfStarter0").exit() == RTC.RTC_OK
+    assert program.over() == 0, program.lines
+
+
+def test_a_signal_while_components_are_made(stage: Stage, orb: Orb) -> None:
+    """All is taken back, then as ever."""
+    program = stage.script(
+        "import os, signal, sys, OpenRTM_aist\n"
+        f"sys.path.insert(0, {str(COMPONENTS)!r})\n"
+        "from ConsoleOut import ConsoleOutInit\n"
+        "def init(manager):\n"
+        "    ConsoleOutInit(manager)\n"
+        "    print('made', manager.createComponent('ConsoleOut') is not None)\n"
+        "    os.kill(os.getpid(), signal.SIGTERM)\n"
+        "manager = OpenRTM_aist.Manager.init(sys.argv)\n"
+        "manager.setModuleInitProc(init)\n"
+        "manager.activateManager()\n"
+        "print('activated')\n"
+        "manager.runManager()\n"
+    )
+    assert program.over() == 0, program.lines
+    assert [line for line in program.lines if line in ("made True", "activated")] == [
+        "made True",
+        "activated",
+    ]
+    assert list(NameServer(orb, stage.names).walk()) == []

@@ -31,15 +31,16 @@ def ended_by_signals(end: Callable[[], object]) -> Iterator[None]:
     source, sink = os.pipe()
     os.set_blocking(sink, False)
     listener = threading.Thread(target=_listen, args=(source, end), name="rtc-signals", daemon=True)
-    handlers = {number: signal.signal(number, lambda number, frame: None) for number in SIGNALS}
-    before = signal.set_wakeup_fd(sink, warn_on_full_buffer=False)
     listener.start()
+    # The handlers do nothing: a signal that comes while they are there and the pipe is not would be lost.
+    before = signal.set_wakeup_fd(sink, warn_on_full_buffer=False)
+    handlers = {number: signal.signal(number, lambda number, frame: None) for number in SIGNALS}
     try:
         yield
     finally:
-        signal.set_wakeup_fd(before)
         for number, handler in handlers.items():
             signal.signal(number, handler)
+        signal.set_wakeup_fd(before)
         os.close(sink)
         listener.join()
         os.close(source)
