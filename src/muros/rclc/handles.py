@@ -76,11 +76,12 @@ def call(self: "Client", request: "Any", timeout: float = _TIMEOUT) -> "Any":
     Not for callbacks: those run in an executor, where ``send`` belongs.
     """
     answers: "list[Any]" = []
-    middleware = self.context.middleware
-    end = ticks_add(self.context.clock(), int(timeout * 1000))
+    context = self.context
+    middleware = context.middleware
+    end = ticks_add(context.clock(), int(timeout * 1000))
     sent = False
     while not answers:
-        now = self.context.clock()
+        now = context.clock()
         left = ticks_diff(end, now)
         if left <= 0:
             return None

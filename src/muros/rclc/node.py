@@ -23,16 +23,17 @@ if TYPE_CHECKING:
 
 def begin(self: "Node", context: "Context", name: str, namespace: str) -> None:
     """Sets up a node."""
-    if not namespace.startswith("/"):
-        namespace = "/" + namespace
     _check(name)
+    full = name
+    if namespace[:1] != "/":
+        namespace = "/" + namespace
     if namespace != "/":
         _check(namespace[1:])
+        full = namespace + "/" + name
     self.context = context
     self.name = name
     self.namespace = namespace
     self.entities = []
-    full = name if namespace == "/" else namespace + "/" + name
     self.participant = context.middleware.participant(full, context.domain_id)
 
 

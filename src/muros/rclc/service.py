@@ -57,8 +57,9 @@ class Service(Handle):
 
     def ready(self, now: int) -> bool:
         """Whether a request can be taken, or an answer sent."""
-        answers = len(self._answers)
-        return (answers < self.depth and len(self._waiting) > 0) or (answers > 0 and self.entity.room())
+        return bool(
+            (self._waiting and len(self._answers) < self.depth) or (self._answers and self.entity.room())
+        )
 
     def run(self, now: int) -> None:
         """Takes a request, calls the callback and answers."""
