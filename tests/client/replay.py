@@ -261,7 +261,7 @@ class Puppet:
 
     def submit(self, kind: int, flags: int, object_id: int, payload: bytes) -> None:
         """A request."""
-        assert submit(self.session, kind, flags, self.session.number(), object_id, payload)
+        assert submit(self.session, kind | flags << 8, self.session.number(), object_id, payload)
 
     def write(self, stream_id: int, object_id: int, data: bytes) -> None:
         """A sample."""

@@ -10,7 +10,7 @@ borrow this for as long as there is a backlog.
 from muros.client.session import put
 from muros.compat import borrow, const
 from muros.xrce.fragments import Cutter
-from muros.xrce.requests import head
+from muros.xrce.requests import add, head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from muros.xrce._types import Buffer
 
 _CONNECTED = const(2)
-_DELETE = const(3)
 _WRITE_DATA = const(7)
 _WRITE = const(0x0107)  # a WRITE_DATA, little endian
 _FRAGMENT = const(13)
+_LASTING = b"\3\7"  # DELETE and WRITE_DATA: the rest is asked for anew
 _HEAD = const(4)
 
 _TOO_LARGE = const(6)  # codes of problems
@@ -61,7 +61,7 @@ class Backlog:
             data: "Any" = borrow("muros.client.pieces").make(session, writer, message, n)
         else:
             data = bytearray(2 * _HEAD + n)
-            head(data, 0, _WRITE, n + _HEAD, session.number(), writer.id)
+            data[: 2 * _HEAD] = head(_WRITE, n + _HEAD, session.number(), writer.id)
             message.write(data, 2 * _HEAD)
         self.items.append(data)
         self.pump()
@@ -91,22 +91,16 @@ class Backlog:
             if self.cutter is None:
                 if data[0] == _WRITE_DATA and (session.state != _CONNECTED or session.pending):
                     break
-                n = len(data) - _HEAD
-                if n > stream.capacity:
-                    self._cut = data
-                    self.cutter = data.cutter() if hasattr(data, "end") else Cutter(data)
-                else:
-                    at = stream.place(n)
-                    if at < 0:
+                if len(data) - _HEAD <= stream.capacity:
+                    if not add(stream, data):
                         break
-                    stream.buf[at : at + len(data)] = data
-                    stream.commit(at, data[0] | data[1] << 8, n)
                     items.pop(0)
                     continue
-            if not self.cutter.pump(stream):
-                break
-            self.cutter = None
-            items.pop(0)
+                self._cut = data
+                self.cutter = data.cutter() if hasattr(data, "end") else Cutter(data)
+            if self.cutter.pump(stream):
+                self.cutter = None
+                items.pop(0)
             break
         stream.flush(session.send, session.now)
         if not items and self._cut is None:
@@ -114,27 +108,24 @@ class Backlog:
 
     def hold(self) -> None:
         """Takes over what the agent has not acknowledged, before the streams begin again."""
-        held: "list[Any]" = []
-        self._held = held
         stream = self.session.reliable
         stream.transmit(stream.first, stream.next, self._take)
         if self.cutter is not None:
             self.items.pop(0)  # its first fragments are under way
             self._take_cut()
-        self.items[:0] = held
-        self._held = []
+        self.items[:0] = self._held
+        self._held.clear()
         self.cutter = self._cut = None
 
     def _take(self, buf: "Buffer", off: int, n: int) -> None:
         """Takes the WRITE_DATA and DELETE out of a message that was sent."""
-        pos = len(self.session.head)
+        pos = self.session.body
         while pos + _HEAD <= n:
             at = off + pos
             size = _HEAD + (buf[at + 2] | buf[at + 3] << 8)
-            kind = buf[at]
-            if kind == _FRAGMENT:
+            if buf[at] == _FRAGMENT:
                 self._take_cut()
-            elif kind == _WRITE_DATA or kind == _DELETE:
+            elif buf[at] in _LASTING:
                 self._held.append(bytes(memoryview(buf)[at : at + size]))
             pos += size + 3 & ~3
 

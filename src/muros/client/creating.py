@@ -9,7 +9,7 @@ from muros.client.entities import UNLIMITED, object_id, renew
 from muros.client.names import dds_type, topic_name
 from muros.compat import const, ticks_add, ticks_diff
 from muros.xrce import create as binary
-from muros.xrce.requests import head
+from muros.xrce.requests import add, head
 from muros.xrce.resetting import reset
 
 TYPE_CHECKING = const(0)
@@ -18,10 +18,8 @@ if TYPE_CHECKING:
 
     from muros.client.session import Entity, Session
 
-_CREATE = const(1)
-_READ_DATA = const(8)
-_LITTLE_ENDIAN = const(0x01)
-_CREATE_FLAGS = const(0x07)  # little endian, REUSE and REPLACE
+_CREATION = const(0x0701)  # little endian, REUSE and REPLACE
+_READING = const(0x0108)  # little endian
 _KIND_PARTICIPANT = const(1)
 _KIND_DATAREADER = const(6)
 _PARENT_BITS = const(12)
@@ -88,21 +86,16 @@ def status(session: "Session", request: int, number: int, status: int) -> None:
             session.pending -= 1
 
 
-def submit(
-    session: "Session", kind: int, flags: int, request: int, object_id: int, payload: "bytes | bytearray"
-) -> bool:
-    """Puts a submessage with ids into the reliable stream; False when there is no room now."""
-    stream = session.reliable
+def submit(session: "Session", kind: int, request: int, object_id: int, payload: bytes) -> bool:
+    """Puts a submessage with ids into the reliable stream; False when there is no room now.
+
+    ``kind`` has the flags from bit 8 on.
+    """
     n = 4 + len(payload)
-    data = bytearray(8)
-    head(data, 0, kind | flags << 8, n, request, object_id)
-    data += payload
-    at = -1 if session.backlog is not None and session.backlog.cutter is not None else stream.place(n)
-    if at >= 0:
-        stream.buf[at : at + len(data)] = data
-        stream.commit(at, kind | flags << 8, n)
-        return True
-    return n > stream.capacity and session.keep().first(data)
+    data = head(kind, n, request, object_id) + payload
+    if n > session.reliable.capacity:
+        return session.keep().first(data)
+    return (session.backlog is None or session.backlog.cutter is None) and add(session.reliable, data)
 
 
 def _create(session: "Session", entity: "Entity", now: int) -> bool:
@@ -114,13 +107,13 @@ def _create(session: "Session", entity: "Entity", now: int) -> bool:
         request = entity.request - step
         if entity.todo >> step & 1 and request not in session.asked:
             if len(session.asked) == _AT_ONCE or not submit(
-                session, _CREATE, _CREATE_FLAGS, request, object_id(entity, step), variant(entity, step)
+                session, _CREATION, request, object_id(entity, step), variant(entity, step)
             ):
                 return False
             session.asked[request] = entity
             session.late = ticks_add(now, session.creation_timeout)
     if entity.todo == 1:
-        if not submit(session, _READ_DATA, _LITTLE_ENDIAN, entity.request, entity.id, _reading(entity)):
+        if not submit(session, _READING, entity.request, entity.id, _reading(entity)):
             return False
         entity.todo = 0
         session.pending -= 1

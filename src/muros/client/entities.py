@@ -62,9 +62,7 @@ def destroy(self: "Entity") -> None:
     for step in (_TOPIC, 1, _GROUP):
         if steps(self) >> step & 1:
             session.asked.pop(self.request - step, None)
-            data = bytearray(8)
-            head(data, 0, _DELETION, 4, session.number(), object_id(self, step))
-            backlog.items.append(data)
+            backlog.items.append(head(_DELETION, 4, session.number(), object_id(self, step)))
 
 
 def write_bytes(self: "Entity", data: "bytes | bytearray") -> bool:

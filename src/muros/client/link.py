@@ -48,13 +48,12 @@ _NEXT = (
 )
 
 _GET_INFO = const(2)
+_ASK = const(0x0102)  # GET_INFO, little endian
 _STATUS_AGENT = const(4)
 _STATUS = const(5)
 _INFO = const(6)
-_LITTLE_ENDIAN = const(0x01)
 _OBJECT_AGENT = const(0xFFFD)
 _OBJECT_CLIENT = const(0xFFFE)
-_STREAM_RELIABLE = const(0x80)
 _PAYLOAD = const(12)  # where that of a control message lies
 _SOON = const(250)  # ms between attempts while an agent is expected back
 _SLOWLY = const(5000)  # ms until a refused session asks again
@@ -155,15 +154,18 @@ def _suspect(session: "Session") -> None:
     An acknowledgement that waits for number 0 may be old. The first of the two is held back until it is asked
     for, so that only an agent which has the second and lacks all before can say that the first is missing.
     """
-    from muros.client.creating import submit
-
-    stream = session.outputs[_STREAM_RELIABLE]
+    stream = session.reliable
     stream.flush(session.send, session.now)
     if stream.first and (stream.next - stream.first & 0xFFFF) + 1 < stream.history:
         session.probe = stream.next + 1
-        submit(session, _GET_INFO, _LITTLE_ENDIAN, session.number(), _OBJECT_AGENT, b"\2\0\0\0")
+        _ask(session)
         stream.flush(_nowhere, session.now)
-    submit(session, _GET_INFO, _LITTLE_ENDIAN, session.number(), _OBJECT_AGENT, b"\2\0\0\0")
+    _ask(session)
+
+
+def _ask(session: "Session") -> None:
+    """Asks what ``Session.ask`` asks, but reliably."""
+    borrow("muros.client.creating").submit(session, _ASK, session.number(), _OBJECT_AGENT, b"\2\0\0\0")
 
 
 def _attempt(session: "Session", now: int) -> None:

@@ -32,7 +32,7 @@ class Pieces:
     def __init__(self, session: "Session", sample: "Any", n: int) -> None:
         self.session = session
         self.sample = sample
-        self.head = bytearray(_HEAD)
+        self.head = b""
         self._n = n
 
     def __len__(self) -> int:
@@ -91,7 +91,7 @@ class PieceCutter(Cutter):
 def make(session: "Session", writer: "Any", sample: "Any", n: int) -> Pieces:
     """Takes a sample of ``n`` bytes."""
     made = Pieces(session, sample, n)
-    head(made.head, 0, _WRITE, n + _IDS, session.number(), writer.id)
+    made.head = head(_WRITE, n + _IDS, session.number(), writer.id)
     sample.begin()
     return made
 

@@ -1,7 +1,7 @@
 """What callbacks with logical execution time publish over a session, held back. Boards load it for those alone."""
 
 from muros.compat import const
-from muros.xrce.requests import head
+from muros.xrce.requests import add, head
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class Outputs:
                 % (count, count, writer.name, count + 1)
             )
         data = bytearray(_HEAD + n)
-        head(data, 0, _WRITE, n + 4, self.session.number(), writer.id)
+        data[:_HEAD] = head(_WRITE, n + 4, self.session.number(), writer.id)
         message.write(data, _HEAD)
         task.outputs.append((writer, data))
         return True
@@ -89,18 +89,15 @@ class Outputs:
 
     def _send(self, writer: "Any", data: bytearray) -> bool:
         session = self.session
-        n = len(data) - 4
+        n = len(data) - _HEAD
         if session.state != _CONNECTED or writer.todo:
             if writer.status or not (writer.stream.reliable and session.queue):
-                session.dropped(_OFFLINE, n - 4, writer)
+                session.dropped(_OFFLINE, n, writer)
                 return False
         elif not writer.stream.reliable:
-            at = writer.stream.place(n)
-            if at < 0:
-                session.dropped(_FULL, n - 4, writer)
+            if not add(writer.stream, data):
+                session.dropped(_FULL, n, writer)
                 return False
-            writer.stream.buf[at : at + n + 4] = data
-            writer.stream.commit(at, _WRITE, n)
             writer.stream.flush(session.send, session.now)
             return True
         backlog = session.keep()
