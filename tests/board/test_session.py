@@ -3,7 +3,7 @@
 from muros.compat import const
 from muros.xrce.beginning import begin, make_input, make_output
 from muros.xrce.fragments import Cutter
-from muros.xrce.resetting import reset
+from muros.xrce.requests import reset
 from muros.xrce.session import SessionCore, flush
 from tests.board.harness import allocates
 
@@ -22,7 +22,7 @@ class End(SessionCore):
     """One end: keeps what it sends and what it handles. ``answers`` are given to submessages in turn, then HANDLED."""
 
     def __init__(self, session_id: int = 0x81, grows: bool = True, largest: int = 4096) -> None:
-        begin(self, session_id, KEY, self._keep, self._take, largest)
+        begin(self, session_id, KEY, self._keep, largest)
         self.sent: "list[bytes]" = []
         self.got: "list[tuple[int, bytes, int]]" = []
         self.answers: "list[int]" = []
@@ -45,7 +45,7 @@ class End(SessionCore):
     def stranger(self, buf: "Buffer", at: int) -> None:
         self.malformed += 1
 
-    def too_long(self, stream_id: int, n: int) -> None:
+    def too_long(self, n: int) -> None:
         self.passed_over.append(n)
 
     def take(self) -> "list[bytes]":
@@ -78,7 +78,7 @@ class End(SessionCore):
     def _keep(self, buf: "Buffer", off: int, n: int) -> None:
         self.sent.append(bytes(buf[off : off + n]))
 
-    def _take(self, kind: int, buf: "Buffer", off: int, n: int) -> int:
+    def handle(self, kind: int, buf: "Buffer", off: int, n: int) -> int:
         answer = self.answers.pop(0) if self.answers else HANDLED
         if answer != LATER:
             self.got.append((kind, bytes(buf[off : off + n]), self.stream.stream_id if self.stream else 0))
@@ -339,7 +339,7 @@ def test_reset_in_a_message_begins_with_number_0() -> None:
             end.got.append((kind, bytes(buf[off : off + n]), 0x80))
         return HANDLED
 
-    end._handle = handle
+    end.handle = handle  # type: ignore[method-assign]
     end.tell(data(0, b"a"))
     end.tell(data(2, b"kept"))
     end.tell(message(0x80, 1, submessage(12, b"")))
@@ -354,13 +354,14 @@ def test_an_error_in_a_handler_does_not_block_the_stream() -> None:
     def broken(kind: int, buf: "Buffer", off: int, n: int) -> int:
         raise ValueError("a user's callback")
 
-    end._handle, good = broken, end._handle
+    good = end.handle
+    end.handle = broken  # type: ignore[method-assign]
     try:
         end.tell(data(0, b"a"))
         raise AssertionError("the error was hidden")
     except ValueError:
         pass
-    end._handle = good
+    end.handle = good  # type: ignore[method-assign]
     end.tell(data(0, b"a"))
     assert end.bodies() == [b"a"]
 
@@ -523,13 +524,11 @@ class Quiet(SessionCore):
     """A session that says nothing and handles everything."""
 
     def __init__(self) -> None:
-        begin(self, 0x81, b"", quiet, ignore, 0)
+        begin(self, 0x81, b"", quiet, 0)
+
+    def handle(self, kind: int, buf: "Buffer", off: int, n: int) -> int:
+        return HANDLED
 
 
 def quiet(buf: "Buffer", off: int, n: int) -> None:
     """Sends nowhere."""
-
-
-def ignore(kind: int, buf: "Buffer", off: int, n: int) -> int:
-    """Handles everything."""
-    return HANDLED

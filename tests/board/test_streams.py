@@ -3,7 +3,7 @@
 from muros.compat import const
 from muros.xrce.beginning import make_input, make_output
 from muros.xrce.mending import accept, announce, missing, resend
-from muros.xrce.resetting import reset_input, reset_output
+from muros.xrce.requests import reset_input, reset_output
 from tests.board.harness import allocates, raises
 from tests.board.test_session import WRITE, End, idle, message, submessage
 

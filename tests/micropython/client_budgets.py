@@ -82,7 +82,7 @@ Executor(context).spin()
 
 WHOLE = """
 compat exports
-xrce/__init__ xrce/session xrce/streams xrce/beginning xrce/resetting xrce/requests
+xrce/__init__ xrce/session xrce/streams xrce/beginning xrce/requests
 xrce/mending xrce/fragments xrce/create
 client/__init__ client/session client/methods client/start client/chance client/making client/names client/qos
 client/link client/hello client/creating client/entities client/backlog

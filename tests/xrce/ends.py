@@ -29,7 +29,7 @@ class End(HostSession):
         start: int = 0,
         largest: int = 1 << 20,
     ) -> None:
-        self.begin(1 if keyed else 0x81, KEY, self._keep, self._take, largest)
+        self.begin(1 if keyed else 0x81, KEY, self._keep, largest)
         self.hosts = hosts
         self.mtu = mtu
         self.out: list[bytes] = []
@@ -84,7 +84,8 @@ class End(HostSession):
         assert len(message) <= self.mtu
         self.out.append(message)
 
-    def _take(self, kind: int, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
+    def answer(self, kind: int, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
+        """Takes a submessage."""
         if self.is_busy():
             return LATER
         self.got.append(bytes(buf[off : off + n]))

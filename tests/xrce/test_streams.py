@@ -10,7 +10,7 @@ from muros.xrce._types import Buffer, Send
 from muros.xrce.beginning import make_input, make_output
 from muros.xrce.mending import accept, announce, missing, resend
 from muros.xrce.queues import QueuedBestEffortOutput, QueuedReliableOutput
-from muros.xrce.resetting import reset_input
+from muros.xrce.requests import reset_input
 from muros.xrce.streams import Input, Output
 from tests.xrce.ends import write
 

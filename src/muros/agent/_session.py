@@ -66,7 +66,7 @@ class AgentSession(HostSession):
     """A client's session. ``key`` is the client key as bytes, ``mtu`` the longest message the client takes."""
 
     def __init__(self, core: "AgentCore", port: "Port", address: Any, key: bytes, session_id: int) -> None:
-        self.begin(session_id, key, self._send_lent, self._submessage, core.limits.max_sample)
+        self.begin(session_id, key, self._send_lent, core.limits.max_sample)
         self.core = core
         self.port = port
         self.address = address
@@ -232,7 +232,7 @@ class AgentSession(HostSession):
         joiner = stream.fragments
         if core.joining + n > core.limits.max_joining and (joiner is None or joiner.limit > 0):
             if joiner is None:
-                joiner = stream.fragments = Joiner(self.largest, stream.stream_id)
+                joiner = stream.fragments = Joiner(self.largest)
             joiner.tear()
             core.report(
                 "too-much-joining",
@@ -250,12 +250,12 @@ class AgentSession(HostSession):
         self.core.joining += n - self.joining
         self.joining = n
 
-    def too_long(self, stream_id: int, n: int) -> None:
+    def too_long(self, n: int) -> None:
         """A joined submessage was longer than the limit."""
         self.core.report(
             "sample-too-long",
             who=self.who,
-            subject=f"stream 0x{stream_id:02X}",
+            subject=f"stream 0x{self.stream.stream_id:02X}",
             what=f"{{n}} sample{{s}} of {self.who} dropped",
             why=f"its fragments make {n} B, more than the {self.largest} B that are joined",
             remedy="Raise max_sample, or write smaller samples.",
@@ -281,7 +281,8 @@ class AgentSession(HostSession):
 
     # Submessages
 
-    def _submessage(self, kind: int, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
+    def answer(self, kind: int, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
+        """Takes a submessage."""
         handler = _HANDLERS.get(kind)
         if handler is not None and not self.closed:
             return handler(self, flags, buf, off, n, stream_id)

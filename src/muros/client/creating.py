@@ -9,8 +9,7 @@ from muros.client.entities import UNLIMITED, object_id, renew
 from muros.client.names import dds_type, topic_name
 from muros.compat import const, ticks_add, ticks_diff
 from muros.xrce import create as binary
-from muros.xrce.requests import add, head
-from muros.xrce.resetting import reset
+from muros.xrce.requests import add, head, reset
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:

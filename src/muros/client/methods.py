@@ -74,7 +74,7 @@ def dropped(self: "Session", code: int, n: int, what: "object" = "") -> bool:
     return False
 
 
-def too_long(self: "Session", stream_id: int, n: int) -> None:
+def too_long(self: "Session", n: int) -> None:
     """A sample that came was larger than ``largest``."""
     dropped(self, _LARGEST, n)
 

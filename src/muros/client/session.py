@@ -206,7 +206,7 @@ class Session(SessionCore):
         if self.receive(buf, off, n, self.now):
             self._heard = self.now
 
-    def take(self, kind: int, buf: "Buffer", off: int, n: int) -> int:
+    def handle(self, kind: int, buf: "Buffer", off: int, n: int) -> int:
         """Takes a submessage."""
         try:
             if kind == _DATA:

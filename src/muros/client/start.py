@@ -45,9 +45,7 @@ def start(
         raise ValueError("client_key must be 4 bytes or an integer from 1 to 0xFFFFFFFF")
     mtu = (mtu or transport.mtu) - 4
     # what lasts comes before what is made on the way
-    begin(
-        self, session_id, client_key, transport.send, self.take, largest or mtu * history * (1 if MPY else 64)
-    )
+    begin(self, session_id, client_key, transport.send, largest or mtu * history * (1 if MPY else 64))
     self.reliable = make_output(_STREAM_RELIABLE, mtu, self.head, history, heartbeat)
     self.outputs[_STREAM_RELIABLE] = self.reliable
     self.inputs[_STREAM_RELIABLE] = make_input(_STREAM_RELIABLE, mtu, history)

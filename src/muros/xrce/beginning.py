@@ -3,12 +3,12 @@
 from array import array
 
 from muros.compat import const
-from muros.xrce.resetting import reset_input, reset_output
+from muros.xrce.requests import reset_input, reset_output
 from muros.xrce.streams import Input, Output
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
-    from muros.xrce._types import Handle, Send
+    from muros.xrce._types import Send
     from muros.xrce.session import SessionCore
 
 _HEAD = const(4)
@@ -19,14 +19,7 @@ _CONTROL = const(8)
 _LONGEST_CONTROL = const(28)  # with the header of the submessage
 
 
-def begin(
-    self: "SessionCore",
-    session_id: int,
-    key: bytes,
-    send: "Send",
-    handle: "Handle",
-    largest: int,
-) -> None:
+def begin(self: "SessionCore", session_id: int, key: bytes, send: "Send", largest: int) -> None:
     """Sets up a core. ``key`` is the client key, 4 bytes; ids below 0x80 carry it in every header.
 
     ``largest`` is the longest joined submessage taken, in bytes.
@@ -40,7 +33,6 @@ def begin(
     self.outputs = {}
     self.now = self.malformed = self.foreign = self.probe = 0
     self.largest = largest
-    self._handle = handle
     self._control = bytearray(_CONTROL - self.body) + self.head + bytes(_LONGEST_CONTROL)
     self._control[_CONTROL + 1] = _LITTLE_ENDIAN
 
@@ -71,9 +63,10 @@ def make_output(
     made._sizes = array("H", bytes(2 * history))
     made._start = len(head)
     made.capacity = mtu - made._start - _HEAD
-    for at in range(0, len(made.buf), mtu or 1):
-        made.buf[at : at + made._start] = head
-        made.buf[at + 1] = stream_id
+    for slot in range(history):
+        slot *= mtu
+        made.buf[slot : slot + made._start] = head
+        made.buf[slot + 1] = stream_id
     reset_output(made)
     return made
 

@@ -24,14 +24,11 @@ if TYPE_CHECKING:
 class Joiner:
     """Joins the pieces of one submessage; at most ``limit`` bytes are kept, a longer one is passed over whole.
 
-    What is in a joined submessage is handled as if it had come on a stream that carries no fragments.
+    What is in a joined submessage is handled as if it had come on no stream.
     """
 
-    reliable = False
-
-    def __init__(self, limit: int, stream_id: int) -> None:
+    def __init__(self, limit: int) -> None:
         self.limit = limit
-        self.stream_id = stream_id
         self.size = 0  # bytes so far
         self.data = bytearray()
 
@@ -49,11 +46,11 @@ class Joiner:
         if buf[off - 3] & _LAST_FRAGMENT:
             if n <= self.limit:
                 self.limit = _TORN  # should handling it fail, the last piece comes again and is passed over
-                submessages(session, self.data, -session.body, n + session.body, self)
+                submessages(session, self.data, -session.body, n + session.body, None)
             else:
                 session.malformed += 1
                 if self.limit != _TORN:
-                    session.too_long(stream.stream_id, n)
+                    session.too_long(n)
             stream.fragments = None
 
     def tear(self) -> None:

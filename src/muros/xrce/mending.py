@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from muros.xrce.streams import Input, Output
 
 _ACKNACK = const(10)
-_STREAM_RELIABLE = const(0x80)
 _BITS = const(16)
 _HOLD_OFF = const(20)
 
@@ -57,16 +56,10 @@ def acknowledge(session: "SessionCore", stream: "Input") -> None:
     tell(session, _ACKNACK, stream.stream_id, stream.expected, bitmap >> 8 | (bitmap & 255) << 8)
 
 
-def heartbeat(session: "SessionCore", buf: "Buffer", at: int) -> None:
-    """Takes a HEARTBEAT."""
-    stream_id = buf[at + 4]
-    if stream_id < _STREAM_RELIABLE:
-        tell(session, _ACKNACK, stream_id, 0, 0)
-        return
-    stream = session.inputs.get(stream_id) or session.make_input(stream_id)
-    if stream is not None:
-        announce(stream, number_at(buf, at, 0), number_at(buf, at, 2))
-        go_on(session, stream, buf, 0, 0)
+def heartbeat(session: "SessionCore", stream: "Input", buf: "Buffer", at: int) -> None:
+    """Takes a HEARTBEAT that tells something new."""
+    announce(stream, number_at(buf, at, 0), number_at(buf, at, 2))
+    go_on(session, stream, buf, 0, 0)
 
 
 def accept(stream: "Input", ahead: int, buf: "Buffer", off: int, n: int) -> bool:

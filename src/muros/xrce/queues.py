@@ -13,12 +13,12 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from muros.xrce import session as core
-from muros.xrce._types import Answer, Buffer, Send
+from muros.xrce._types import Buffer, Send
 from muros.xrce.beginning import begin, make_output
 from muros.xrce.constants import HANDLED, LATER
 from muros.xrce.fragments import Joiner
 from muros.xrce.mending import acknowledge, go_on
-from muros.xrce.resetting import reset_input, reset_output
+from muros.xrce.requests import reset_input, reset_output
 from muros.xrce.streams import Output
 
 if TYPE_CHECKING:
@@ -38,14 +38,14 @@ class HostSession(core.SessionCore):
     """
 
     stop_at_failure = True
+    _joining: "Input | None" = None  # a stream whose joined submessages are being handled
 
-    def begin(self, session_id: int, key: bytes, send: Send, answer: Answer, largest: int) -> None:
-        """Sets up a session; arguments as for ``beginning.begin``.
+    if TYPE_CHECKING:
 
-        ``answer(kind, flags, buf, off, n, stream_id)`` takes submessages.
-        """
-        begin(self, session_id, key, send, self._judge, largest)
-        self._answer = answer
+        def answer(self, kind: int, flags: int, buf: Buffer, off: int, n: int, stream_id: int) -> int:
+            """Takes a submessage: ``HANDLED``, ``FAILED`` or ``LATER``."""
+
+    begin = begin
 
     def flush(self, now: int) -> None:
         """Sends what was built on any stream and not sent, and the HEARTBEATs that are due."""
@@ -79,19 +79,22 @@ class HostSession(core.SessionCore):
         held: Any = stream.fragments
         if isinstance(held, _Held) and held.limit < 0:
             stream.fragments = None  # the message with the last piece was given up
+        before, self._joining = self._joining, stream
         try:
             super()._on_fragment(buf, at, n, stream)
         except _LaterError as later:
             held = stream.fragments
-            stream.fragments = _Held(stream.stream_id, held.data[later.at :])
+            stream.fragments = _Held(held.data[later.at :])
             raise _LaterError(at - _HEAD) from None
+        finally:
+            self._joining = before
 
-    def _judge(self, kind: int, buf: Buffer, off: int, n: int) -> int:
-        stream_id = self.stream.stream_id if self.stream is not None else 0
-        result = self._answer(kind, buf[off - 3], buf, off, n, stream_id)
+    def handle(self, kind: int, buf: Buffer, off: int, n: int) -> int:
+        """Takes a submessage."""
+        stream = self.stream or self._joining
+        result = self.answer(kind, buf[off - 3], buf, off, n, stream.stream_id if stream else 0)
         if result == LATER:
-            stream = self.inputs.get(stream_id)
-            if stream is not None and stream.busy:
+            if stream and stream.busy:
                 raise _LaterError(off - _HEAD)
             return LATER  # on no stream, or on one that was reset meanwhile
         return result if self.stop_at_failure else HANDLED
@@ -115,13 +118,13 @@ class _LaterError(Exception):
 class _Held(Joiner):
     """What is left of a joined submessage that waits."""
 
-    def __init__(self, stream_id: int, data: bytearray) -> None:
-        super().__init__(0, stream_id)
+    def __init__(self, data: bytearray) -> None:
+        super().__init__(0)
         self.data = data
 
     def take(self, session: core.SessionCore, stream: "Input", buf: Buffer, off: int, n: int) -> None:
         """Its last piece comes again: goes on with it."""
-        core.submessages(session, self.data, -session.body, len(self.data) + session.body, self)
+        core.submessages(session, self.data, -session.body, len(self.data) + session.body, None)
         stream.fragments = None
 
 

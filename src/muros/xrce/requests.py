@@ -1,4 +1,4 @@
-"""Submessages with ids, as they are put into streams now and then. Boards borrow this."""
+"""What a client needs when it connects anew: streams that begin again, and requests in them. Boards borrow this."""
 
 from struct import pack
 
@@ -6,7 +6,8 @@ from muros.compat import const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
-    from muros.xrce.streams import Output
+    from muros.xrce.session import SessionCore
+    from muros.xrce.streams import Input, Output
 
 _HEAD = const(4)
 
@@ -28,3 +29,24 @@ def add(stream: "Output", data: "bytes | bytearray") -> bool:
     stream.buf[at : at + len(data)] = data
     stream.commit(at, data[0] | data[1] << 8, n)
     return True
+
+
+def reset(self: "SessionCore") -> None:
+    """All streams of a session, both ways, begin again; what they keep is dropped."""
+    for stream in self.inputs.values():
+        reset_input(stream)
+    for stream in self.outputs.values():
+        reset_output(stream)
+
+
+def reset_output(self: "Output") -> None:
+    """Begins again with number 0; every kept message is dropped."""
+    self.first = self.sent = self.next = self._again = self._again_at = 0
+
+
+def reset_input(self: "Input") -> None:
+    """Expects number 0 again; kept messages are dropped."""
+    self.expected = self.known = 0
+    self.early.clear()
+    self.busy = False
+    self.fragments = None

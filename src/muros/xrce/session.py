@@ -18,7 +18,7 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
 
-    from muros.xrce._types import Buffer, Handle, Send
+    from muros.xrce._types import Buffer, Send
 
 _FRAGMENT = const(13)
 _ACKNACK = const(10)
@@ -26,6 +26,7 @@ _HEARTBEAT = const(11)
 _WRITE_DATA = const(7)
 _DATA = const(9)
 _LITTLE_ENDIAN = const(0x01)
+_STREAM_RELIABLE = const(0x80)
 _HEAD = const(4)
 _CONTROL = const(8)  # where the submessage of a control message lies in its buffer, behind the longest header
 
@@ -47,14 +48,16 @@ class SessionCore:
         probe: int  # the client's, see there
         stream: "Any"  # of the submessage that is being handled; None for none
         largest: int  # the longest joined submessage taken, in bytes
-        _handle: "Handle"
         _control: bytearray
+
+        def handle(self, kind: int, buf: "Buffer", off: int, n: int) -> int:
+            """Takes a submessage, which lies behind its header; not 0: the rest of the message is passed over."""
 
         def make_input(self, stream_id: int) -> "Any":
             """The input stream for an id not used yet; None refuses it."""
 
-        def too_long(self, stream_id: int, n: int) -> None:
-            """A joined submessage of ``n`` bytes was longer than ``largest`` and was passed over."""
+        def too_long(self, n: int) -> None:
+            """A joined submessage of ``n`` bytes on ``stream`` was longer than ``largest`` and was passed over."""
 
         def stranger(self, buf: "Buffer", at: int) -> None:
             """The peer acknowledges what was never sent; ``at`` is where its ACKNACK says what."""
@@ -103,7 +106,7 @@ class SessionCore:
 
     def _on_fragment(self, buf: "Buffer", at: int, n: int, stream: "Any") -> None:
         if stream.fragments is None:
-            stream.fragments = borrow("muros.xrce.fragments").Joiner(self.largest, stream.stream_id)
+            stream.fragments = borrow("muros.xrce.fragments").Joiner(self.largest)
         stream.fragments.take(self, stream, buf, at, n)
 
 
@@ -182,23 +185,24 @@ def _submessage(session: SessionCore, buf: "Buffer", at: int, n: int) -> int:
         if n >= 5:
             _on_heartbeat(session, buf, at)
     elif kind != _FRAGMENT:
-        return session._handle(kind, buf, at, n)
+        return session.handle(kind, buf, at, n)
     elif session.stream is not None and session.stream.reliable:
         session._on_fragment(buf, at, n, session.stream)
     return 0
 
 
 def _on_heartbeat(session: SessionCore, buf: "Buffer", at: int) -> None:
-    stream = session.inputs.get(buf[at + 4])
-    if (
-        stream
-        and stream.reliable
-        and not stream.known
-        and number_at(buf, at, 2) == stream.expected - 1 & 0xFFFF
-    ):
-        tell(session, _ACKNACK, stream.stream_id, stream.expected, 0)  # it asks about what is here
+    stream_id = buf[at + 4]
+    if stream_id < _STREAM_RELIABLE:
+        tell(session, _ACKNACK, stream_id, 0, 0)
+        return
+    stream = session.inputs.get(stream_id) or session.make_input(stream_id)
+    if stream is None:
+        pass
+    elif stream.known or number_at(buf, at, 2) != stream.expected - 1 & 0xFFFF:
+        session.mend().heartbeat(session, stream, buf, at)
     else:
-        session.mend().heartbeat(session, buf, at)
+        tell(session, _ACKNACK, stream_id, stream.expected, 0)  # it asks about what is here
 
 
 def number_at(buf: "Buffer", at: int, i: int) -> int:
