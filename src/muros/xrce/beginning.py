@@ -4,12 +4,12 @@ from array import array
 
 from muros.compat import const
 from muros.xrce.requests import reset_input, reset_output
-from muros.xrce.streams import Input, Output
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from muros.xrce._types import Send
     from muros.xrce.session import SessionCore
+    from muros.xrce.streams import Input, Output
 
 _HEAD = const(4)
 _LITTLE_ENDIAN = const(0x01)
@@ -52,7 +52,10 @@ def make_output(
     """
     if history & history - 1 or not 0 < history <= 0x4000:
         raise ValueError("history is %d: it must be a power of two up to 16384" % history)
-    made = made or Output()
+    if made is None:
+        from muros.xrce.streams import Output  # here, as it outlasts this module
+
+        made = Output()
     made.stream_id = stream_id
     made.reliable = stream_id >= _STREAM_RELIABLE
     made.mtu = mtu
@@ -74,6 +77,8 @@ def make_output(
 def make_input(stream_id: int, mtu: int = 0, window: int = 1) -> "Input":
     """A receiver, reliable when its id is: then messages that come early are kept, less than ``window`` of them, each
     up to ``mtu`` bytes."""
+    from muros.xrce.streams import Input  # here, as it outlasts this module
+
     made = Input()
     made.stream_id = stream_id
     made.reliable = stream_id >= _STREAM_RELIABLE
