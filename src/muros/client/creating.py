@@ -64,11 +64,9 @@ def status(session: "Session", request: int, number: int, status: int) -> None:
     """Takes the STATUS of a request about the object with the id ``number``."""
     entity = session.asked.get(request)
     if entity is None:
-        if status >= _ERROR:
-            for entity in session.entities:
-                if entity.request == request and entity.id == number:
-                    session.problem(_PROBLEM_READ, status, entity.name)
-                    break
+        for entity in session.entities:
+            if entity.request == request and entity.id == number and status >= _ERROR:
+                session.problem(_PROBLEM_READ, status, entity.name)
         return
     step = entity.request - request
     if object_id(entity, step) != number:
@@ -76,8 +74,9 @@ def status(session: "Session", request: int, number: int, status: int) -> None:
     del session.asked[request]
     session.laps = 0
     if entity.todo >> step & 1:
-        entity.todo -= 1 << step
-        if status >= _ERROR:
+        if status < _ERROR:
+            entity.todo -= 1 << step
+        else:
             entity.status = status
             entity.todo = _REFUSED
             session.problem(_PROBLEM_ENTITY, status, entity.name)

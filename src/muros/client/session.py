@@ -216,8 +216,9 @@ class Session(SessionCore):
                 elif reader.deliver:
                     reader.deliver(buf, off + 4, n - 4)
             else:
-                if -kind in self.objects:
-                    self.objects[-kind](buf, off, n)
+                taker = self.objects.get(-kind)
+                if taker is not None:
+                    taker(buf, off, n)
                 if kind == _INFO and self.guide is None and n >= 6 and buf[off + 5]:
                     pass  # the agent is there, as we thought
                 elif kind != _TIMESTAMP_REPLY:
