@@ -29,12 +29,12 @@ class End(SessionCore):
         self.passed_over: "list[int]" = []
         self._grows = grows
         self.outputs[0x80] = make_output(0x80, MTU, self.head, 4, 100)
-        self.outputs[1] = make_output(1, MTU, self.head)
+        self.outputs[1] = make_output(1, MTU, self.head, 1, 0)
 
     def make_input(self, stream_id: int) -> "Input | None":
         if not self._grows:
             return None
-        stream = make_input(stream_id, MTU, 16) if stream_id >= 0x80 else make_input(stream_id)
+        stream = make_input(stream_id, MTU, 16) if stream_id >= 0x80 else make_input(stream_id, 0, 1)
         self.inputs[stream_id] = stream
         return stream
 

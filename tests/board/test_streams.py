@@ -109,7 +109,7 @@ def newer(end: End, *numbers: int) -> "list[bool]":
 
 def test_best_effort_numbers_count_and_wrap() -> None:
     line = Line()
-    stream = make_output(1, 32, bytearray(b"\x81\0\0\0"))
+    stream = make_output(1, 32, bytearray(b"\x81\0\0\0"), 1, 0)
     stream.next = stream.first = stream.sent = 65534
     for _ in range(4):
         assert fill(stream)
@@ -120,7 +120,7 @@ def test_best_effort_numbers_count_and_wrap() -> None:
 
 def test_best_effort_packs_until_the_mtu() -> None:
     line = Line()
-    stream = make_output(1, 32, bytearray(b"\x81\0\0\0"))
+    stream = make_output(1, 32, bytearray(b"\x81\0\0\0"), 1, 0)
     assert fill(stream, 5)  # 4 + 4 + 5 = 13
     assert fill(stream, 8)  # 16 + 4 + 8 = 28
     assert not fill(stream, 1)  # 28 + 4 + 1 = 33
@@ -131,7 +131,7 @@ def test_best_effort_packs_until_the_mtu() -> None:
 
 
 def test_best_effort_refuses_what_never_fits() -> None:
-    stream = make_output(1, 32, bytearray(b"\x81\0\0\0"))
+    stream = make_output(1, 32, bytearray(b"\x81\0\0\0"), 1, 0)
     assert stream.capacity == 24
     assert fill(stream, 24)
     reset_output(stream)

@@ -36,11 +36,10 @@ class End(HostSession):
         self.got: list[bytes] = []
         self.is_busy: Callable[[], bool] = lambda: False
         self.stop_at_failure = False
-        output: Any = (
-            QueuedReliableOutput(RELIABLE, mtu, self.head, window, 100)
-            if hosts
-            else make_output(RELIABLE, mtu, self.head, window, 100, QueuedOutput())
-        )
+        output: Any = make_output(RELIABLE, mtu, self.head, window, 100)
+        output.__class__ = QueuedOutput
+        if hosts:
+            output = QueuedReliableOutput(RELIABLE, mtu, self.head, window, 100)
         output.next = output.first = output.sent = start
         self.outputs[RELIABLE] = output
         self._window = window
@@ -49,7 +48,7 @@ class End(HostSession):
 
     def make_input(self, stream_id: int) -> Any:
         """Every stream comes into being."""
-        stream = make_input(stream_id)
+        stream = make_input(stream_id, 0, 1)
         if stream_id >= RELIABLE:
             stream = make_input(stream_id, self.mtu, self._window)
             stream.expected = self._begin

@@ -224,7 +224,7 @@ def test_a_queue_that_is_reset_forgets_what_waits() -> None:
 @given(st.lists(st.binary(max_size=20), max_size=20), st.sampled_from([0, 65530]))
 def test_best_effort_of_boards_and_hosts_are_alike(bodies: list[bytes], start: int) -> None:
     lines = [Line(), Line()]
-    board = make_output(1, 20, bytearray(HEAD))
+    board = make_output(1, 20, bytearray(HEAD), 1, 0)
     host = QueuedBestEffortOutput(1, 20, bytearray(HEAD))
     for stream in (board, host):
         stream.next = stream.first = stream.sent = start

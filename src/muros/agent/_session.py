@@ -233,7 +233,8 @@ class AgentSession(HostSession):
         if core.joining + n > core.limits.max_joining and (joiner is None or joiner.limit > 0):
             if joiner is None:
                 joiner = stream.fragments = Joiner(self.largest)
-            joiner.tear()
+            joiner.limit = -1
+            joiner.data = bytearray()
             core.report(
                 "too-much-joining",
                 who=self.who,

@@ -93,7 +93,7 @@ def output(self: "Session", reliable: int) -> "Output":
         return self.reliable
     if _STREAM_BEST_EFFORT not in self.outputs:
         self.outputs[_STREAM_BEST_EFFORT] = borrow("muros.xrce.beginning").make_output(
-            _STREAM_BEST_EFFORT, self.reliable.mtu, self.head
+            _STREAM_BEST_EFFORT, self.reliable.mtu, self.head, 1, 0
         )
     stream: "Output" = self.outputs[_STREAM_BEST_EFFORT]
     return stream

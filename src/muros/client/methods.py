@@ -42,7 +42,7 @@ def make_input(self: "Session", stream_id: int) -> "Input | None":
     """The stream for best effort is made when something comes on it; there are no others."""
     if stream_id != _STREAM_BEST_EFFORT:
         return None
-    made: "Input" = borrow("muros.xrce.beginning").make_input(stream_id)
+    made: "Input" = borrow("muros.xrce.beginning").make_input(stream_id, 0, 1)
     self.inputs[stream_id] = made
     return made
 

@@ -1,7 +1,5 @@
 """A session's core and its streams when they are made. See ``session`` and ``streams``. Boards borrow this."""
 
-from array import array
-
 from muros.compat import const
 from muros.xrce.requests import reset_input, reset_output
 
@@ -37,25 +35,17 @@ def begin(self: "SessionCore", session_id: int, key: bytes, send: "Send", larges
     self._control[_CONTROL + 1] = _LITTLE_ENDIAN
 
 
-def make_output(
-    stream_id: int,
-    mtu: int,
-    head: bytearray,
-    history: int = 1,
-    period: int = 0,
-    made: "Output | None" = None,
-) -> "Output":
+def make_output(stream_id: int, mtu: int, head: bytearray, history: int, period: int) -> "Output":
     """A sender. ``head`` is the session's header: session id, stream, number, and the key if it has one.
 
     ``history`` (a power of two) messages may wait to be sent and acknowledged. With an ``mtu`` of 0 there is no
-    buffer to reserve in. ``made`` is a sender of another class.
+    buffer to reserve in.
     """
     if history & history - 1 or not 0 < history <= 0x4000:
         raise ValueError("history is %d: it must be a power of two up to 16384" % history)
-    if made is None:
-        from muros.xrce.streams import Output  # here, as it outlasts this module
+    from muros.xrce.streams import Output  # here, as it outlasts this module
 
-        made = Output()
+    made = Output()
     made.stream_id = stream_id
     made.reliable = stream_id >= _STREAM_RELIABLE
     made.mtu = mtu
@@ -63,7 +53,7 @@ def make_output(
     made.period = period
     made.due = made.resends = 0
     made.buf = bytearray(mtu * history)
-    made._sizes = array("H", bytes(2 * history))
+    made._sizes = [0] * history
     made._start = len(head)
     made.capacity = mtu - made._start - _HEAD
     for slot in range(history):
@@ -74,7 +64,7 @@ def make_output(
     return made
 
 
-def make_input(stream_id: int, mtu: int = 0, window: int = 1) -> "Input":
+def make_input(stream_id: int, mtu: int, window: int) -> "Input":
     """A receiver, reliable when its id is: then messages that come early are kept, less than ``window`` of them, each
     up to ``mtu`` bytes."""
     from muros.xrce.streams import Input  # here, as it outlasts this module

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 class Joiner:
     """Joins the pieces of one submessage; at most ``limit`` bytes are kept, a longer one is passed over whole.
 
+    A limit of -1 says that a piece was given up by its sender.
+
     What is in a joined submessage is handled as if it had come on no stream.
     """
 
@@ -52,11 +54,6 @@ class Joiner:
                 if self.limit != _TORN:
                     session.too_long(n)
             stream.fragments = None
-
-    def tear(self) -> None:
-        """Messages are missing now: the submessage is passed over to its end."""
-        self.limit = _TORN
-        self.data = bytearray()
 
 
 class Cutter:

@@ -20,33 +20,27 @@ if TYPE_CHECKING:
 
 _ACKNACK = const(10)
 _BITS = const(16)
+_TORN = const(-1)
 _HOLD_OFF = const(20)
 
 
 def take(session: "SessionCore", stream: "Input", ahead: int, buf: "Buffer", off: int, n: int) -> None:
     """Takes a message of a reliable stream that is not simply the next one."""
-    if accept(stream, ahead, buf, off, n):
-        go_on(session, stream, buf, off, n)
-    else:
+    if not accept(stream, ahead, buf, off, n):
         acknowledge(session, stream)
+    elif stream.busy or stream.expected in stream.early or session.take_next(stream, buf, off, n):
+        go_on(session, stream)
 
 
-def go_on(session: "SessionCore", stream: "Input", buf: "Buffer", off: int, n: int) -> None:
-    """Handles what is in order now and acknowledges: first the expected message, which is the one that is kept or
-    else ``buf[off:off + n]``, then those kept behind it. What a submessage sets off may lead back here; the outer
+def go_on(session: "SessionCore", stream: "Input") -> None:
+    """Handles what is kept and in order now, and acknowledges. What a submessage sets off may lead back here; the outer
     call goes on then."""
-    while not stream.busy:
+    while not stream.busy and stream.expected in stream.early:
         number = stream.expected
-        if number in stream.early:
-            buf = stream.early[number]
-            off = 0
-            n = len(buf)
-        elif n == 0:
-            break
-        if not session.take_next(stream, buf, off, n):
+        buf = stream.early[number]
+        if not session.take_next(stream, buf, 0, len(buf)):
             return
         stream.early.pop(number, None)
-        n = 0
     acknowledge(session, stream)
 
 
@@ -59,7 +53,7 @@ def acknowledge(session: "SessionCore", stream: "Input") -> None:
 def heartbeat(session: "SessionCore", stream: "Input", buf: "Buffer", at: int) -> None:
     """Takes a HEARTBEAT that tells something new."""
     announce(stream, number_at(buf, at, 0), number_at(buf, at, 2))
-    go_on(session, stream, buf, 0, 0)
+    go_on(session, stream)
 
 
 def accept(stream: "Input", ahead: int, buf: "Buffer", off: int, n: int) -> bool:
@@ -71,10 +65,9 @@ def accept(stream: "Input", ahead: int, buf: "Buffer", off: int, n: int) -> bool
         return False
     if ahead >= stream.known:
         stream.known = ahead + 1
-    number = stream.expected + ahead & 0xFFFF
-    if ahead and n <= stream.mtu and number not in stream.early:
+    if ahead and n <= stream.mtu:
         try:
-            stream.early[number] = bytes(memoryview(buf)[off : off + n])
+            stream.early[stream.expected + ahead & 0xFFFF] = bytes(memoryview(buf)[off : off + n])
         except MemoryError:
             pass
     return ahead == 0
@@ -90,7 +83,7 @@ def announce(stream: "Input", first: int, last: int) -> None:
             if number - first & 0x8000:
                 del stream.early[number]
         if stream.fragments is not None:
-            stream.fragments.tear()
+            stream.fragments.limit = _TORN
     count = last + 1 - stream.expected & 0xFFFF
     if stream.known < count < 0x8000:
         stream.known = count

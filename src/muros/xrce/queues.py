@@ -105,7 +105,7 @@ def resume(session: HostSession, stream_id: int, now: int) -> None:
     stream = session.inputs.get(stream_id)
     if stream is not None and stream.expected in stream.early and not stream.busy:
         session.now = now
-        go_on(session, stream, b"", 0, 0)
+        go_on(session, stream)
 
 
 class _LaterError(Exception):
@@ -131,6 +131,9 @@ class _Held(Joiner):
 class QueuedOutput(Output):
     """What both kinds share."""
 
+    def __init__(self, stream_id: int, head: bytearray, history: int, period: int) -> None:
+        vars(self).update(vars(make_output(stream_id, 0, head, history, period)))
+
     def idle(self) -> bool:
         """Whether everything is sent and acknowledged."""
         return self.first == self.next
@@ -144,7 +147,7 @@ class QueuedBestEffortOutput(QueuedOutput):
     """Sends each submessage at once, in a message of its own."""
 
     def __init__(self, stream_id: int, mtu: int, head: bytearray) -> None:
-        make_output(stream_id, 0, head, made=self)
+        super().__init__(stream_id, head, 1, 0)
         self.mtu = mtu
         self._head = head
 
@@ -166,7 +169,7 @@ class QueuedReliableOutput(QueuedOutput):
     def __init__(self, stream_id: int, mtu: int, head: bytearray, history: int, period: int) -> None:
         self._kept: deque[bytes] | None = None
         self._waiting: deque[bytes] | None = None
-        make_output(stream_id, 0, head, history, period, self)
+        super().__init__(stream_id, head, history, period)
         self.mtu = mtu
         self._head = head
 

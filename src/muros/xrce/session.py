@@ -129,7 +129,7 @@ def _take(session: SessionCore, buf: "Buffer", off: int, n: int) -> None:
         session.mend().take(session, stream, ahead, buf, off, n)
     elif session.take_next(stream, buf, off, n):
         if stream.known:
-            session.mend().go_on(session, stream, buf, 0, 0)
+            session.mend().go_on(session, stream)
         else:
             tell(session, _ACKNACK, stream.stream_id, stream.expected, 0)
 

@@ -22,8 +22,6 @@ from muros.compat import const, ticks_add
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
-    from array import array
-
     from muros.xrce._types import Send
     from muros.xrce.fragments import Joiner
 
@@ -47,7 +45,7 @@ class Output:
         resends: int
         capacity: int  # the longest payload in bytes that a message of its own can carry
         _start: int  # where the submessages of a message begin
-        _sizes: "array[int]"  # the bytes of each message, by its slot
+        _sizes: "list[int]"  # the bytes of each message, by its slot
         _again: int  # bit i: message first + i was sent again at _again_at
         _again_at: int
 
