@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     Buffer = bytes | bytearray | memoryview
 
 
+_ANY = const(0x3FFFFFFF)
+
+
 class CdrError(ValueError):
     """A message does not fit its type: received bytes are short or malformed, or a value cannot be written."""
 
@@ -30,17 +33,12 @@ class Fields:
     """A nested message: its fields are the attributes. What type it is only the message around it knows."""
 
 
-def need(have: int, count: int) -> None:
-    """Raises CdrError unless at least ``count`` bytes are there."""
+def need(have: int, count: int, padding: int = _ANY) -> None:
+    """Raises CdrError unless at least ``count`` bytes are there, and at most ``padding`` more."""
     if have < count:
         raise CdrError("%d bytes, %d needed" % (have, count))
-
-
-def ended(left: int) -> None:
-    """Raises CdrError unless the body ends here; transports pad it with up to 3 bytes."""
-    if left > 3:
-        raise CdrError("%d bytes left over" % left)
-    need(left, 0)
+    if have - count > padding:
+        raise CdrError("%d bytes left over" % (have - count))
 
 
 def integer(buf: "Buffer", p: int, size: int, signed: int) -> int:

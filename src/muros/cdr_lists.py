@@ -39,13 +39,7 @@ def put_sequence(
 ) -> int:
     """Writes a sequence; returns the offset behind it. Allocates unless it is of bytes."""
     n = len(values)
-    if bound:
-        need(bound, n)
-    while p - off & 3:
-        buf[p] = 0
-        p += 1
-    pack_into("<I", buf, p, n)
-    p += 4
+    p = put_count(buf, p, off, n, bound)
     if not n:
         return p
     if code == "s":

@@ -7,12 +7,14 @@ aligned here, so that generated code, of which there is much, stays short.
 
 from struct import calcsize, pack_into, unpack_from
 
-from muros.cdr import CdrError, ended, integer, need
+from muros.cdr import CdrError, integer, need
 from muros.compat import const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import Any
+
+_PADDING = const(3)  # bytes that transports may put behind a body
 
 
 def part(at: "list[Any]", align: int, size: int) -> int:
@@ -32,7 +34,7 @@ def unpack(at: "list[Any]", form: str, align: int) -> "tuple[Any, ...]":
 
 def finish(at: "list[Any]") -> None:
     """Raises CdrError unless the body ends here."""
-    ended(at[2] - at[3])
+    need(at[2], at[3], _PADDING)
 
 
 def count(at: "list[Any]", least: int, bound: int = 0) -> int:

@@ -40,6 +40,7 @@ Blank = Callable[[str, str], list[str]]
 _WORTH = 12  # leaves that a type must save, by being written out only once, before its code becomes functions
 RUN = 5
 """Sequences in a row from which on one call for all of them is worth ``muros.cdr_rows``."""
+_PADDING = 3  # bytes that transports may put behind a body
 
 
 class Memo:
@@ -412,13 +413,12 @@ class _FixedReader(_Runs):
     """Reads a message of fixed size, whose bytes are counted once."""
 
     def run(self, found: Sequence[Leaf], size: int) -> list[str]:
-        self.code.line(f"need(n, {size})")
+        self.code.line(f"need(n, {size}, {_PADDING})")
         self._walk(found)
         if any(chunk[-1:] in ("f", "d", "s") for chunk, _, _ in self._run):
             self._unpack('unpack_from("{}", buf, off)')
         else:
             self._read()
-        self.code.line(f"return ended(n - {size})")
         return self.code.lines
 
     def _read(self) -> None:

@@ -39,7 +39,7 @@ ACTION_TYPES = ("action_msgs/srv/CancelGoal", "action_msgs/msg/GoalStatusArray")
 """What all actions have in common."""
 
 _HELPERS = {
-    "muros.cdr": ("Fields", "block", "ended", "integer", "need", "numbers"),
+    "muros.cdr": ("Fields", "block", "integer", "need", "numbers"),
     "muros.cdr_texts": ("count", "finish", "pad", "part", "put_text", "text", "text_size", "unpack"),
     "muros.cdr_lists": ("list_size", "put_count", "put_sequence", "sequence", "texts_size"),
     "muros.cdr_rows": ("new_sequences", "put_sequences", "sequences", "sequences_size"),
