@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -98,6 +99,15 @@ def test_a_wish_may_need_a_lock_of_the_main_thread() -> None:
             signal.raise_signal(signal.SIGINT)
             assert not ended.is_set()
         assert ended.wait(10)
+
+
+def test_a_process_forked_meanwhile_is_not_waited_for() -> None:
+    """It has the pipe, too, and may run longer."""
+    with ended_by_signals(lambda: None):
+        sink = signal.set_wakeup_fd(-1)
+        signal.set_wakeup_fd(sink, warn_on_full_buffer=False)
+        forked = os.dup(sink)
+    os.close(forked)
 
 
 def test_a_second_signal_ends_the_process_at_once() -> None:

@@ -20,6 +20,8 @@ __all__ = ["ended_by_signals"]
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 SAME_WISH: Final = 0.1
 """Seconds after a signal in which others are the same wish: `timeout` signals a process, and then its group."""
+OVER: Final = b"\0"
+"""What is written to the pipe after all signals."""
 
 
 @contextmanager
@@ -31,25 +33,28 @@ def ended_by_signals(end: Callable[[], object]) -> Iterator[None]:
     source, sink = os.pipe()
     os.set_blocking(sink, False)
     listener = threading.Thread(target=_listen, args=(source, end), name="rtc-signals", daemon=True)
-    listener.start()
     # The handlers do nothing: a signal that comes while they are there and the pipe is not would be lost.
     before = signal.set_wakeup_fd(sink, warn_on_full_buffer=False)
     handlers = {number: signal.signal(number, lambda number, frame: None) for number in SIGNALS}
+    listener.start()
     try:
         yield
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
         signal.set_wakeup_fd(before)
-        os.close(sink)
+        os.write(sink, OVER)  # to close it would not do: a forked process may have it, too
         listener.join()
+        os.close(sink)
         os.close(source)
 
 
 def _listen(source: int, end: Callable[[], object]) -> None:
     """Call `end` for the first signal that comes out of a pipe; end the process for one after that."""
     ended: float | None = None
-    while numbers := os.read(source, 64):
+    numbers = b""
+    while not numbers.endswith(OVER):
+        numbers = os.read(source, 64)
         now = time.monotonic()
         for number in numbers:
             if number not in SIGNALS:
