@@ -14,6 +14,7 @@ from typing import Any
 
 import RTC
 from OpenRTM_aist import CORBA_RTCUtil, CorbaNaming, Properties
+from tests.rtc.conftest import find_free_port
 
 COMPONENTS = Path(__file__).parent / "components"
 PATIENCE = 20.0
@@ -91,6 +92,7 @@ class Stage:
         self._programs: list[Program] = []
         (folder / "rtc.conf").write_text(
             f"corba.nameservers: {names}\ncorba.endpoints: 127.0.0.1:\nnaming.formats: %n.rtc\n"
+            f"corba.master_manager: 127.0.0.1:{find_free_port()}\n"
             "logger.enable: NO\nexec_cxt.periodic.rate: 100\n"
         )
 
