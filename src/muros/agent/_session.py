@@ -242,10 +242,10 @@ class AgentSession(HostSession):
                 why=f"samples that come in pieces make {core.joining} B of {core.limits.max_joining} B",
                 remedy="Find the client that begins samples and does not end them, or raise limits.max_joining.",
             )
-        super()._on_fragment(buf, at, n, stream)
-        self._joins(
-            sum(len(s.fragments.data) for s in self.inputs.values() if s.reliable and s.fragments is not None)
-        )
+        try:
+            super()._on_fragment(buf, at, n, stream)
+        finally:
+            self._joins(sum(len(s.fragments.data) for s in self.inputs.values() if s.fragments is not None))
 
     def _joins(self, n: int) -> None:
         self.core.joining += n - self.joining
