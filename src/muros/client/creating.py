@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 _CREATION = const(0x0701)  # little endian, REUSE and REPLACE
 _READING = const(0x0108)  # little endian
 _KIND_PARTICIPANT = const(1)
-_KIND_DATAREADER = const(6)
 _PARENT_BITS = const(12)
 _QOS_RELIABLE = const(0x01)
 _STREAM_BEST_EFFORT = const(0x01)
@@ -125,7 +124,7 @@ def variant(entity: "Entity", step: int) -> "Any":
     if kind == _KIND_PARTICIPANT:
         return create.participant(entity.name, entity.domain)
     parent = (entity.above & (1 << _PARENT_BITS) - 1) << 4 | _KIND_PARTICIPANT
-    if kind > _KIND_DATAREADER:
+    if hasattr(entity, "room"):  # a side of a service
         return create.service(
             kind,
             entity.name,

@@ -26,7 +26,7 @@ def hello(session: "Session") -> bytes:
     properties = []
     if session.hard_liveliness:
         properties.append(_LIVELINESS % session.hard_liveliness)
-    if session.attempt is not None:
+    if session.properties:
         session.attempt = session.attempt or draw(4)
         properties.append(_ATTEMPT % tuple(session.attempt))
     body = b"XRCE\1\0\1\x0f" + session.key + session.head[:1]

@@ -196,8 +196,7 @@ def _on_status_agent(session: "Session", status: int) -> None:
         _suspect(session)  # the network repeated our CREATE_CLIENT
     elif status < 0x80:
         session.login = False
-        if session.attempt:
-            session.attempt = b""
+        session.attempt = b""
         session.foreign = session.probe = 0
         session._heard = session.now
         borrow("muros.client.creating").accepted(session)

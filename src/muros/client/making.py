@@ -118,7 +118,7 @@ def enter(
     made.qos = profile(qos)
     made.type_name = type_name
     made.above = node.id >> 4
-    if kind > _KIND_DATAREADER:
+    if hasattr(made, "room"):  # a side of a service
         dds_type(type_name, "_Response")
         topic_name("rq", name, "Request")
     else:

@@ -65,6 +65,7 @@ class Session(SessionCore):
     guide: "Any" = None  # the module ``link`` while there is more to do than to watch
     backlog: "Backlog | None" = None
     create: "Any" = None  # makes representations that are not binary
+    properties = True
     hard_liveliness = 0
     trouble: "Any" = None  # what was told that keeps us from the agent; hosts add since when
     on_state: "Callable[[int], object] | None" = None
@@ -86,7 +87,7 @@ class Session(SessionCore):
         laps: int  # how often that was in vain
         counts: "array[int]"  # the next index for each kind of object
         key: bytes
-        attempt: "bytes | None"  # what names the attempt to connect, empty until it is made
+        attempt: bytes  # what names the attempt to connect, empty until it is made
         suspected: int  # the tick since which the agent seems to be out of step
         queue: int
         retry: int

@@ -56,7 +56,7 @@ def start(
     self.up = False
     self.state = self._heard = self._tries = self._ping = self.pending = self.laps = 0
     self._due = None
-    self.attempt = b"" if properties else None
+    self.attempt = b""
     self.drops = array("I", bytearray(20))
     self.entities = []
     self.objects = {}
@@ -69,6 +69,8 @@ def start(
     self.ping_attempts = ping_attempts
     self.retry = retry
     self.creation_timeout = creation_timeout
+    if not properties:
+        self.properties = False
     if hard_liveliness:
         self.hard_liveliness = hard_liveliness
     if creation != "binary":
