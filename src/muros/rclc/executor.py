@@ -115,6 +115,8 @@ class Handle:
     eager = True
     entity: "Any" = None
     handles: "list[Any] | None" = None  # those of the executor that it was added to
+    take: "Any" = None  # a subscription's
+    _answers: "Any" = None  # a service's that wait
 
     if TYPE_CHECKING:
         cancelled: bool

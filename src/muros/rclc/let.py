@@ -139,7 +139,7 @@ class Let:
         elif not (news or due) or not executor.trigger(executor.handles):
             return False
         for task in ready:
-            if hasattr(task.handle, "take"):
+            if task.handle.take:
                 task.input = task.handle.take()
             task.state = "RELEASED"
             task.begun = task.end = self._number
@@ -187,7 +187,7 @@ class Let:
         handle = task.handle
         if handle not in self.executor.handles:
             return  # a callback of this period has taken it away
-        if not hasattr(handle, "take"):
+        if not handle.take:
             handle.run(self._start)
         elif handle.callback is not None:
             handle.callback(task.input)

@@ -84,7 +84,7 @@ class Outputs:
         for writer, data in task.outputs:
             if not self._send(writer, data):
                 task.lost += 1
-        if hasattr(task.handle, "_answers"):
+        if task.handle._answers:
             task.handle._send()
 
     def _send(self, writer: "Any", data: bytearray) -> bool:

@@ -88,7 +88,7 @@ class Rules:
         no member of it, and on boards without its shape.
         """
         plan = borrow("muros.rclc.memory_plan").make(self, kind)
-        return (Guard if hasattr(handle, "take") else CallGuard)(handle, kind, plan)
+        return (Guard if handle.take else CallGuard)(handle, kind, plan)
 
 
 class Guard:

@@ -42,7 +42,7 @@ def begin(executor: "Any", options: "dict[str, Any]") -> None:
 
 def prepare(executor: "Any", handle: "Any", when: int, let: float, messages: int) -> None:
     """Sets up a handle that is about to be added."""
-    if when and not hasattr(handle, "take"):
+    if when and not handle.take:
         from muros.rclc.handle_error import HandleError
 
         raise HandleError("%r cannot run ALWAYS: only subscriptions can" % handle)

@@ -137,7 +137,7 @@ class Executor(executor_.Executor):
             )
         if handle in self.handles and self.handles is not self.context.handles:
             raise HandleError(f"{describe(handle)}, was added already: an executor runs each handle once")
-        if when == ALWAYS and not hasattr(handle, "take"):
+        if when == ALWAYS and not handle.take:
             raise HandleError(f"{describe(handle)}, cannot run ALWAYS: only subscriptions can")
         handles.add(self, handle, callback)
         if self.let is not None:
