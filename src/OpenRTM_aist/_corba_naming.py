@@ -4,8 +4,6 @@
 from __future__ import annotations
 
 import contextlib
-from collections import deque
-from collections.abc import Iterator
 from typing import Any
 
 __all__ = ["CorbaNaming"]
@@ -96,28 +94,6 @@ class CorbaNaming:
             found = () if context is None else entries_of(context)
             return [one for one in found if one.binding_name[-1].kind == string_kind]
         return []
-
-    def find(self, id_: str, kind: str) -> Iterator[Any]:
-        """The objects of this name in any context, nearest first. What does not answer on the way is left out."""
-        import CosNaming
-        from omniORB import CORBA
-
-        from muros.rtc.corba._naming import WALK_LIMIT, entries_of, is_same
-
-        seen, waiting = [self._context], deque([self._context])
-        while waiting:
-            context = waiting.popleft()
-            with contextlib.suppress(CORBA.Exception):
-                for one in entries_of(context):
-                    name = one.binding_name[-1]
-                    if one.binding_type == CosNaming.ncontext:
-                        inner = context.resolve([name])._narrow(CosNaming.NamingContext)
-                        known = inner is None or any(is_same(inner, other) for other in seen)
-                        if not known and len(seen) < WALK_LIMIT:
-                            seen.append(inner)
-                            waiting.append(inner)
-                    elif (name.id, name.kind) == (id_, kind):
-                        yield context.resolve([name])
 
     # Names
 

@@ -84,6 +84,9 @@ class MemoryWorld:
 
     def member(self, name: str) -> None: ...
 
+    def components_at(self, address: str) -> Sequence[object]:
+        return ()
+
     def connect(
         self, ports: Sequence[str], local: Mapping[str, object], name: str, properties: Mapping[str, str]
     ) -> None:

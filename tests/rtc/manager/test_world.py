@@ -277,6 +277,7 @@ def test_addresses_of_other_processes(
     for address in (
         f"rtcname://{name_server.address}/Wheel0",
         "rtcname://*/Wheel0",
+        "rtcname://*/*/Wheel0.rtc",
         f"rtcname://{name_server.address}/robot.host_cxt/Wheel0",
         f"rtcloc://127.0.0.1:{port}/test/Wheel0",
         f"rtcloc://127.0.0.1:{port}/*/Wheel0",

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from threading import Thread
 from typing import TYPE_CHECKING, Any, Final
 
 from muros.rtc.codes import PeerLostError, RtcError
 from muros.rtc.corba._conversion import to_nv_list
-from muros.rtc.corba._lost import QUICK_SECONDS, peer, quick_answer
+from muros.rtc.corba._lost import QUICK_SECONDS, asked_again, peer, quick_answer
 from muros.rtc.corba._manager import ManagerServant, PeerManager
 from muros.rtc.corba._naming import NameServer
 from muros.rtc.corba._orb import Orb, current_orb, start_orb
@@ -33,6 +34,8 @@ DEFAULT_KEY: Final = "manager"
 MASTER_PORT: Final = 2810
 """TCP port of a master manager whose address has none."""
 
+ANYWHERE: Final = "*/"
+"""Before a component's name: in any context of a name server."""
 
 MANAGER_TIMEOUT: Final = 2.0
 """Seconds within which a manager says that it is one."""
@@ -150,39 +153,65 @@ class CorbaWorld:
                 if code != RTC.RTC_OK:
                     raise RtcError(f"{address} cannot be activated: {code}")
 
-    def _component_at(self, address: str) -> Any:
-        """`rtcname://HOST[:PORT]/PATH` (HOST may be `*`, the path's `.rtc` left out) or `rtcloc://HOST:PORT/CATEGORY/NAME`."""
+    def components_at(self, address: str) -> list[Any]:
         kind, _, rest = address.partition("://")
         place, _, path = rest.partition("/")
+        asked: list[Callable[[], Iterable[Any]]]
         if kind == "rtcloc":
-            found = list(self.manager_at(place).components_by_name(path))
+            asked = [lambda: self.manager_at(place).components_by_name(path)]
         elif kind == "rtcname":
             servers = self._registration.servers if place in ("*", "") else (NameServer(self.orb, place),)
-            found = [one for server in servers for one in _named(server, path)]
+            asked = [partial(_named, server, path) for server in servers]
         else:
             raise RtcError(f"{address}: write rtcname://HOST/NAME or rtcloc://HOST:PORT/CATEGORY/NAME")
-        lost: PeerLostError | None = None
-        for one in found:
+        found: list[Any] = []
+        failure: RtcError | None = None
+        for ask in asked:
             try:
-                with peer(address):
-                    component = one._narrow(RTC.RTObject)
-            except PeerLostError as error:
-                lost = error
+                references = list(ask())
+            except RtcError as error:
+                failure = error
                 continue
-            if component is not None:
-                return component
-        raise lost or RtcError(f"{address}: there is no such component")
+            for one in references:
+                try:
+                    component = _component(one, address)
+                except RtcError as error:
+                    failure = error
+                    continue
+                if component is not None:
+                    found.append(component)
+        if not found:
+            raise failure or RtcError(f"{address}: there is no such component")
+        return found
+
+    def _component_at(self, address: str) -> Any:
+        return self.components_at(address)[0]
 
 
-def _named(server: NameServer, path: str) -> list[Any]:
-    """What has the path, without `.rtc`, at a server; else everything of that name anywhere."""
-    reference = server.resolve(path if path.endswith(".rtc") else f"{path}.rtc")
-    if reference is not None:
-        return [reference]
-    if "/" in path:
-        return []
-    paths = [place for place, binding in server.walk() if (binding.name, binding.kind) == (path, "rtc")]
-    return [found for place in paths if (found := server.resolve(place)) is not None]
+def _named(server: NameServer, path: str) -> Iterator[Any]:
+    """What has the path, without `.rtc`, at a server; else, and for `*/NAME`, everything of that name anywhere."""
+    plain = path.removeprefix(ANYWHERE).removesuffix(".rtc")
+    if not path.startswith(ANYWHERE):
+        reference = server.resolve(f"{plain}.rtc")
+        if reference is not None:
+            yield reference
+            return
+    if "/" in plain:
+        return
+    for place, binding in server.walk():
+        if (binding.name, binding.kind) == (plain, "rtc"):
+            reference = server.resolve(place)
+            if reference is not None:
+                yield reference
+
+
+def _component(reference: Any, address: str) -> Any:
+    """The component behind a reference; None where it is none. PeerLostError if it does not answer, or has ended."""
+    with peer(address):
+        component = asked_again(lambda: reference._narrow(RTC.RTObject))
+        if component is not None and asked_again(component._non_existent):
+            raise PeerLostError(f"{address} has ended")
+        return component
 
 
 def _port(component: Any, name: str, address: str) -> Any:

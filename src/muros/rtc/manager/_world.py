@@ -123,6 +123,15 @@ class World(Protocol):
         """The component of another process that a composite has as a member; None where there is none."""
         ...
 
+    def components_at(self, address: str) -> Sequence[Reference]:
+        """The components at an address that answer: RtcError where there is none, PeerLostError where it is silent.
+
+        `rtcname://HOST[:PORT]/PATH` is a name at a name server, `.rtc` at its end left out or not; a single name, or
+        `*/NAME`, may stand in any context; HOST `*`: the servers of `corba.nameservers`.
+        `rtcloc://HOST:PORT/CATEGORY/NAME` is asked of a manager.
+        """
+        ...
+
     def connect(
         self, ports: Sequence[str], local: Mapping[str, Reference], name: str, properties: Mapping[str, str]
     ) -> None:
