@@ -26,6 +26,7 @@ __all__ = [
     "read_conf_file",
     "read_conf_untrusted",
     "seconds_of",
+    "split_address",
     "split_list",
     "write_conf",
 ]
@@ -174,6 +175,12 @@ def write_conf(properties: Mapping[str, str]) -> str:
 def split_list(text: str) -> tuple[str, ...]:
     """The parts of a text between commas, without blanks around them and without empty ones."""
     return tuple(part for word in text.split(",") if (part := word.strip()))
+
+
+def split_address(text: str, port: str = "") -> tuple[str, str]:
+    """The host and the port of HOST, HOST:PORT or [IPV6]:PORT; `port` where there is none."""
+    host, colon, given = text.rpartition(":")
+    return (host, given) if colon and not text.endswith("]") else (text, port)
 
 
 def is_yes(text: str) -> bool:

@@ -12,6 +12,7 @@ from muros.rtc.properties import (
     is_yes,
     read_conf_file,
     read_conf_untrusted,
+    split_address,
     split_list,
     write_conf,
 )
@@ -162,3 +163,19 @@ def test_merging_leaves_the_first_alone() -> None:
     properties = Properties({"a": "1", "b": "2"})
     assert properties.merged({"b": "3", "c": "4"}) == {"a": "1", "b": "3", "c": "4"}
     assert properties == {"a": "1", "b": "2"}
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("robot", ("robot", "7")),
+        ("robot:2809", ("robot", "2809")),
+        ("robot:", ("robot", "")),
+        (":2809", ("", "2809")),
+        ("[::1]", ("[::1]", "7")),
+        ("[::1]:2809", ("[::1]", "2809")),
+        ("", ("", "7")),
+    ],
+)
+def test_addresses_have_a_host_and_a_port(text: str, parts: tuple[str, str]) -> None:
+    assert split_address(text, "7") == parts

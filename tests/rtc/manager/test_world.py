@@ -17,7 +17,8 @@ from muros.rtc.codes import PeerLostError, ReturnCode, RtcError
 from muros.rtc.corba import Orb, RunningNameServer
 from muros.rtc.corba._manager import PeerManager
 from muros.rtc.corba._naming import NameServer, is_same
-from muros.rtc.corba._world import CorbaWorld
+from muros.rtc.corba._world import CorbaWorld, _endpoints
+from muros.rtc.properties import Properties
 from tests.rtc.conftest import find_free_port
 from tests.rtc.manager._processes import Managers, wait_until, world_beside
 
@@ -487,3 +488,17 @@ def _lives(reference: Any) -> bool:
         return reference is not None and not reference._non_existent()
     except CORBA.Exception:
         return False
+
+
+@pytest.mark.parametrize(
+    ("endpoints", "master", "opened"),
+    [
+        ("all", "localhost:2815", ":2815"),
+        ("127.0.0.1:", "localhost", "127.0.0.1:2810, 127.0.0.1:"),
+        ("[::1]", "[::1]", "[::1]:2810, [::1]"),
+        ("[::1]:2810", "[::1]:2810/manager", "[::1]:2810"),
+    ],
+)
+def test_a_master_listens_where_slaves_look_for_it(endpoints: str, master: str, opened: str) -> None:
+    settings = {"corba.endpoints": endpoints, "corba.master_manager": master, "manager.is_master": "YES"}
+    assert _endpoints(Properties(settings)) == opened

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Final
 
+from omniORB import CORBA
 from omniORB import any as any_values
 
 from muros.rtc.codes import ReturnCode, RtcError
-from muros.rtc.corba._conversion import to_nv_list, to_return_code
+from muros.rtc.corba._conversion import from_return_code, to_nv_list, to_return_code
 from muros.rtc.corba._lost import peer
 from muros.rtc.corba._naming import is_same
 from muros.rtc.corba._orb import current_orb
 from muros.rtc.corba._stubs import RTC, RTM, RTM__POA
 
 if TYPE_CHECKING:
+    from muros.rtc.component import Component
     from muros.rtc.manager import Manager
 
 __all__ = ["ManagerServant", "PeerManager"]
@@ -62,24 +65,26 @@ class ManagerServant(RTM__POA.Manager):  # type: ignore[misc]
         reference = made[0]
         from muros.rtc.component import Component
 
-        return self._manager.reference_of(reference) if isinstance(reference, Component) else reference
+        if not isinstance(reference, Component):
+            return reference
+        return next(iter(self._references([reference])), None)
 
     def delete_component(self, instance_name: str) -> Any:
         return to_return_code(self._manager.delete_component(instance_name))
 
     def get_components(self) -> list[Any]:
-        own = [self._manager.reference_of(component) for component in self._manager.components]
+        own = self._references(self._manager.components)
         return own + self._manager.colleagues.gather("get_components")
 
     def get_component_profiles(self) -> list[Any]:
-        own = [
-            self._manager.reference_of(component).get_component_profile()  # type: ignore[attr-defined]
-            for component in self._manager.components
-        ]
+        own: list[Any] = []
+        for component in self._references(self._manager.components):
+            with suppress(CORBA.OBJECT_NOT_EXIST):
+                own.append(component.get_component_profile())
         return own + self._manager.colleagues.gather("get_component_profiles")
 
     def get_components_by_name(self, name: str) -> list[Any]:
-        own = [self._manager.reference_of(component) for component in self._manager.components_by_name(name)]
+        own = self._references(self._manager.components_by_name(name))
         return own + self._manager.colleagues.components_by_name(name)
 
     # The manager itself
@@ -133,6 +138,14 @@ class ManagerServant(RTM__POA.Manager):  # type: ignore[misc]
 
     def get_service(self, name: str) -> Any:
         return None
+
+    def _references(self, components: Iterable[Component]) -> list[Any]:
+        """Those to components, but for what ends at this moment."""
+        found: list[Any] = []
+        for component in components:
+            with suppress(KeyError):
+                found.append(self._manager.reference_of(component))
+        return found
 
     def _about(self, reference: Any, act: Callable[[PeerManager], ReturnCode]) -> Any:
         return to_return_code(ReturnCode.BAD_PARAMETER if reference is None else act(PeerManager(reference)))
@@ -219,7 +232,7 @@ class PeerManager:
 
     def _code(self, operation: str, *arguments: object) -> ReturnCode:
         with peer("the manager"):
-            return ReturnCode(getattr(self._reference, operation)(*arguments)._v)
+            return from_return_code(getattr(self._reference, operation)(*arguments))
 
     def _property(self, name: str) -> str:
         with peer("the manager"):

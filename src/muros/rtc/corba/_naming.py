@@ -22,8 +22,9 @@ from omniORB import CORBA
 
 from muros.findings import Finding, Severity
 from muros.rtc.codes import PeerLostError, RtcError
-from muros.rtc.corba._lost import LOST, asked_again, describe
+from muros.rtc.corba._lost import LOST, asked_again, describe, is_there
 from muros.rtc.corba._orb import Orb
+from muros.rtc.properties import split_address
 
 __all__ = ["Binding", "NameServer", "Names", "entries_of", "is_same", "lives", "server_address", "split_path"]
 
@@ -57,9 +58,7 @@ class Binding:
 def server_address(text: str) -> str:
     """`HOST:PORT` of an entry of `corba.nameservers`, which may lack the port or be a `corbaname`. RtcError if bad."""
     address = re.sub(r"^corba(?:name|loc):(?:iiop)?:", "", text.strip())
-    host, colon, port = address.rstrip("/").rpartition(":")
-    if not colon or address.endswith("]"):
-        host, port = address.rstrip("/"), str(DEFAULT_PORT)
+    host, port = split_address(address.rstrip("/"), str(DEFAULT_PORT))
     if not host.strip(":") or not (port.isascii() and port.isdigit() and 0 < int(port) < 65536):
         raise RtcError(f"'{text}' is no address of a name server: write HOST or HOST:PORT")
     return f"{host}:{port}"
@@ -263,7 +262,7 @@ class Names:
     def _tell_taken(self, server: NameServer, path: str, reference: Any, outcome: str) -> bool:
         """Whether a living object of another process has the name."""
         bound = server.resolve(path)
-        if bound is None or is_same(bound, reference) or not lives(bound):
+        if bound is None or is_same(bound, reference) or not is_there(bound):
             return False
         self._report(
             Finding(

@@ -22,6 +22,7 @@ from omniORB import CORBA
 from muros.rtc.codes import RtcError
 from muros.rtc.corba._adapter import Adapter, Place, object_key
 from muros.rtc.corba._workers import wait_until_gone
+from muros.rtc.properties import split_address
 
 __all__ = ["Orb", "current_orb", "endpoint_arguments", "start_orb"]
 
@@ -224,9 +225,7 @@ def _end_at_exit() -> None:
 
 def _address(text: str) -> str:
     """HOST:PORT, both parts of which may be empty, of an endpoint of rtc.conf."""
-    host, colon, port = text.rpartition(":")
-    if text.endswith("]") or not colon:
-        host, port = text, ""
+    host, port = split_address(text)
     if port and not (port.isascii() and port.isdigit() and int(port) < 65536):
         raise RtcError(
             f"endpoint '{text}' of corba.endpoints: '{port}' is no port. Write HOST:PORT, HOST, :PORT or all"

@@ -15,10 +15,8 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 from functools import partial
 from typing import Any, Final
 
-from omniORB import CORBA
-
 from muros.rtc.codes import PeerLostError, RtcError
-from muros.rtc.corba._lost import quick_answer
+from muros.rtc.corba._lost import is_there, quick_answer
 from muros.rtc.corba._naming import Names, NameServer, _quoted, is_same, lives, split_path
 from muros.rtc.corba._orb import Orb
 from muros.rtc.reports import Reporter
@@ -92,7 +90,9 @@ class Registration:
         for server in servers:
             with self._noted(server):
                 bound = server.resolve(name)
-                if not is_same(bound, self._names.bound.get(name)) and not _has_gone(bound):
+                if bound is None or is_same(bound, self._names.bound.get(name)):
+                    continue
+                if is_there(bound):
                     return False
         return True
 
@@ -174,13 +174,3 @@ class Registration:
         self._reporter.report(
             "name-not-bound", who="naming", what=f"{name} is not bound", why=why, remedy=remedy, subject=name
         )
-
-
-def _has_gone(reference: Any | None) -> bool:
-    """Whether there is nobody behind a reference. One that is slow to answer lives."""
-    try:
-        return reference is None or bool(reference._non_existent())
-    except CORBA.TIMEOUT:
-        return False
-    except CORBA.Exception:
-        return True

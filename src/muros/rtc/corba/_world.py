@@ -17,7 +17,7 @@ from muros.rtc.corba._organization import ForeignMember
 from muros.rtc.corba._registration import Registration
 from muros.rtc.corba._setup import set_up
 from muros.rtc.corba._stubs import RTC, RTM
-from muros.rtc.properties import Properties
+from muros.rtc.properties import Properties, split_address
 from muros.rtc.reports import Reporter
 
 if TYPE_CHECKING:
@@ -227,9 +227,7 @@ def _manager_location(address: str) -> str:
     if address.startswith(("corbaloc:", "IOR:")):
         return address
     place, _, key = address.strip().partition("/")
-    host, colon, port = place.rpartition(":")
-    if not colon or place.endswith("]"):
-        host, port = place, str(MASTER_PORT)
+    host, port = split_address(place, str(MASTER_PORT))
     return f"corbaloc:iiop:{host}:{port}/{key or DEFAULT_KEY}"
 
 
@@ -238,11 +236,9 @@ def _endpoints(settings: Properties) -> str:
     endpoints = settings.get("corba.endpoints", "all")
     if not settings.flag("manager.is_master"):
         return endpoints
-    host, _, port = settings["corba.master_manager"].partition("/")[0].rpartition(":")
-    if not host:
-        port = str(MASTER_PORT)
+    _, port = split_address(settings["corba.master_manager"].partition("/")[0], str(MASTER_PORT))
     first = endpoints.split(",")[0].strip()
-    own = "" if first in ("", "all") else first.rpartition(":")[0] if ":" in first else first
+    own = "" if first in ("", "all") else split_address(first)[0]
     at_master = f"{own}:{port}"
     if at_master in [part.strip() for part in endpoints.split(",")]:
         return endpoints

@@ -17,7 +17,7 @@ from typing import Any, Final
 from muros.rtc.codes import PeerLostError, ReturnCode, RtcError
 from muros.rtc.manager._world import RemoteManager, World
 from muros.rtc.profiles import Reference
-from muros.rtc.properties import Properties
+from muros.rtc.properties import Properties, split_address
 from muros.rtc.reports import Reporter
 
 __all__ = ["Colleagues"]
@@ -284,7 +284,7 @@ class Colleagues:
         # Where the master stays on one address, so does its slave, on a port of its own.
         endpoints = settings.get("corba.endpoints", "all").split(",")[0].strip()
         if endpoints not in ("", "all"):
-            passed["corba.endpoints"] = endpoints.rpartition(":")[0] + ":" if ":" in endpoints else endpoints
+            passed["corba.endpoints"] = f"{split_address(endpoints)[0]}:"
         for key in settings:
             if not key.startswith(OWN_KEYS):
                 passed.setdefault(key, settings[key])

@@ -62,7 +62,7 @@ class Components:
         return self._components.get(name)
 
     def reference_of(self, component: Component) -> Reference:
-        """How others call it."""
+        """How others call it. KeyError for one that they do not know yet, or no longer."""
         return self._references[component.instance_name]
 
     def names_of(self, component: Component) -> tuple[str, ...]:

@@ -326,7 +326,7 @@ class Manager:
         )
 
     def reference_of(self, component: Component) -> Reference:
-        """How others call a component."""
+        """How others call a component. KeyError for one that they do not know yet, or no longer."""
         return self._components.reference_of(component)
 
     def names_of(self, component: Component) -> tuple[str, ...]:
