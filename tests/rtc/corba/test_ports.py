@@ -535,6 +535,12 @@ def test_a_foreign_component_that_ends_is_forgotten(pair: Pair, start: Start) ->
     assert pair.out.get_connector_profiles() == pair.inp.get_connector_profiles() == []
 
 
+def halt(foreign: Foreign) -> None:
+    """Stop a process, and wait until it stands still."""
+    foreign.process.send_signal(signal.SIGSTOP)
+    os.waitid(os.P_PID, foreign.process.pid, os.WSTOPPED)
+
+
 def test_a_peer_that_stands_still_keeps_its_connections_for_some_time(
     pair: Pair, start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -544,7 +550,7 @@ def test_a_peer_that_stands_still_keeps_its_connections_for_some_time(
     foreign, reference = start("Foreign0")
     _, their_out = reference.get_ports()
     assert pair.inp.connect(request(pair.inp, their_out, **PUSH))[0] == RTC.RTC_OK
-    foreign.process.send_signal(signal.SIGSTOP)
+    halt(foreign)
     for _ in range(_port.PATIENCE - 1):
         assert len(pair.inp.get_connector_profiles()) == 1
     foreign.process.send_signal(signal.SIGCONT)
@@ -553,7 +559,7 @@ def test_a_peer_that_stands_still_keeps_its_connections_for_some_time(
     seconds = 10.0  # it answers, however slow the machine is
     assert len(pair.inp.get_connector_profiles()) == 1
     seconds = 0.2
-    foreign.process.send_signal(signal.SIGSTOP)
+    halt(foreign)
     for _ in range(_port.PATIENCE):
         pair.inp.get_connector_profiles()
     assert pair.sink.ports[0].connectors == ()
