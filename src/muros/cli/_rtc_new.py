@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import keyword
+import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -137,9 +138,9 @@ def component_source(wishes: Wishes) -> str:
     ]
     lines += [f"    {key} = {_quoted(value)}" for key, value in _attributes(profile)]
     declared = [
-        *(_declared_port("InPort", port, names[port.name]) for port in inputs),
-        *(_declared_port("OutPort", port, names[port.name]) for port in outputs),
-        *(_declared_parameter(one, names[one.name]) for one in profile.parameters),
+        *(_declared_port("InPort", port, names[id(port)]) for port in inputs),
+        *(_declared_port("OutPort", port, names[id(port)]) for port in outputs),
+        *(_declared_parameter(one, names[id(one)]) for one in profile.parameters),
         *(_declared_interface(port, one, names) for port, one in interfaces),
     ]
     if declared:
@@ -157,7 +158,7 @@ def component_source(wishes: Wishes) -> str:
         '        """Once in each cycle while the component is active."""',
     ]
     for port in inputs:
-        attribute = names[port.name]
+        attribute = names[id(port)]
         lines += [
             f"        if self.{attribute}.is_new():",
             f"            value = self.{attribute}.read()",
@@ -204,6 +205,9 @@ def _checked(profile: RtcProfile) -> RtcProfile:
     """The profile, if a component can be written of it."""
     if not IDENTIFIER.fullmatch(profile.name) or keyword.iskeyword(profile.name):
         raise RtcError(f"{profile.name!r} cannot be the name of a class; use letters, digits and _")
+    rate = profile.execution_rate
+    if rate is not None and not 0 < rate < math.inf:
+        raise RtcError(f"{rate:g} is no rate of an execution context; give cycles per second, more than 0")
     data, services = [port.name for port in profile.data_ports], [port.name for port in profile.service_ports]
     named = [*data, *services]
     for name in named:
@@ -211,9 +215,12 @@ def _checked(profile: RtcProfile) -> RtcProfile:
             raise RtcError(f"{name!r} cannot be the name of a port; use letters, digits and _")
         if named.count(name) > 1:
             raise RtcError(f"there are two ports {name!r}; names of ports are unique")
+    parameters = [parameter.name for parameter in profile.parameters]
     for parameter in profile.parameters:
         if not IDENTIFIER.fullmatch(parameter.name):
             raise RtcError(f"{parameter.name!r} cannot be the name of a parameter; use letters, digits and _")
+        if parameters.count(parameter.name) > 1:
+            raise RtcError(f"there are two parameters {parameter.name!r}; names of parameters are unique")
         _value(parameter)
     for port in profile.data_ports:
         if not TYPE.fullmatch(port.type):
@@ -223,6 +230,10 @@ def _checked(profile: RtcProfile) -> RtcProfile:
             if not TYPE.fullmatch(one.type):
                 raise RtcError(
                     f"port {service.name}: {one.type!r} is no interface; write MyService or My::Service"
+                )
+            if not IDENTIFIER.fullmatch(one.instance_name):
+                raise RtcError(
+                    f"{one.instance_name!r} cannot be the name of an interface; use letters, digits and _"
                 )
             if not one.idl_file:
                 raise RtcError(
@@ -269,22 +280,23 @@ def _services(arguments: argparse.Namespace) -> tuple[tuple[ServicePortProfile, 
     return tuple(ServicePortProfile(name, tuple(ones)) for name, ones in ports.items()), files
 
 
-def _attribute_names(profile: RtcProfile) -> dict[str, str]:
-    """The attribute for each port and parameter: its name, with `_` where Python or Component have that already."""
+def _attribute_names(profile: RtcProfile) -> dict[int, str]:
+    """The attributes for ports, parameters and interfaces, by their `id`s: their names, with `_` where these are taken.
+
+    Python and Component have names, too, and a port may be called as a parameter is.
+    """
     from muros.rtc.component import Component
 
-    names: dict[str, str] = {}
-    interfaces = [one.instance_name for port in profile.service_ports for one in port.interfaces]
+    names: dict[int, str] = {}
     wanted = [
-        *(port.name for port in profile.data_ports),
-        *(one.name for one in profile.parameters),
-        *interfaces,
+        *((id(port), port.name) for port in profile.data_ports),
+        *((id(one), one.name) for one in profile.parameters),
+        *((id(one), one.instance_name) for port in profile.service_ports for one in port.interfaces),
     ]
-    for name in wanted:
-        attribute = name
+    for which, attribute in wanted:
         while keyword.iskeyword(attribute) or hasattr(Component, attribute) or attribute in names.values():
             attribute += "_"
-        names.setdefault(name, attribute)
+        names[which] = attribute
     return names
 
 
@@ -324,8 +336,8 @@ def _declared_parameter(parameter: ParameterProfile, attribute: str) -> str:
     return f"    {attribute} = Parameter({', '.join(words)})"
 
 
-def _declared_interface(port: ServicePortProfile, one: ServiceInterfaceProfile, names: dict[str, str]) -> str:
-    attribute = names[one.instance_name]
+def _declared_interface(port: ServicePortProfile, one: ServiceInterfaceProfile, names: dict[int, str]) -> str:
+    attribute = names[id(one)]
     words = [
         _quoted(one.type),
         f"idl={_quoted(one.idl_file)}",
@@ -386,7 +398,11 @@ def _members(interfaces: Iterable[ServiceInterfaceProfile], files: Sequence[Path
 
 def _quoted(value: object) -> str:
     """As Python source, texts in double quotes."""
-    return json.dumps(value, ensure_ascii=False) if not isinstance(value, bool) else repr(value)
+    if isinstance(value, list):
+        return f"[{', '.join(map(_quoted, value))}]"
+    if isinstance(value, float) and not math.isfinite(value):
+        return f'float("{value}")'
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(value)
 
 
 def _plain(text: str) -> str:

@@ -89,6 +89,19 @@ def test_everything_at_once(folder: Path, capsys: pytest.CaptureFixture[str]) ->
     assert (folder / "Turner/MyService.idl").read_text() == IDL
 
 
+def test_names_may_be_alike_and_numbers_beyond_all(folder: Path) -> None:
+    words = ["--inport", "a:TimedLong", "--config", "a:double:1", "--config", "b:vector<double>:inf,-1,nan"]
+    assert main(["rtc", "new", "A", *words, "--service", "S:a:I", "--service-idl", "MyService.idl"]) == 0
+    source = (folder / "A/A.py").read_text()
+    for line in (
+        "    a = InPort(TimedLong)",
+        '    a_ = Parameter(1.0, name="a")',
+        '    b = Parameter([float("inf"), -1.0, float("nan")])',
+        '    a__ = Provided("I", idl="MyService.idl", port="S", instance="a")',
+    ):
+        assert line in source.splitlines()
+
+
 def test_the_profile_gives_the_same_component(folder: Path) -> None:
     assert main(["rtc", "new", "Turner", *ALL]) == 0
     assert main(["rtc", "new", "--profile", "Turner/RTC.xml", "--folder", "again"]) == 0
@@ -159,6 +172,10 @@ def test_nothing_is_written_over(folder: Path, capsys: pytest.CaptureFixture[str
         (["A", "--config", "gain:double"], "--config gain:double: write NAME:TYPE:DEFAULT"),
         (["A", "--config", "gain:double:fast"], "parameter gain: 'fast' is no double"),
         (["A", "--config", "on:bool:2"], "parameter on: '2' is no bool"),
+        (["A", "--config", "a:int:1", "--config", "a:double:2"], "there are two parameters 'a'"),
+        (["A", "--rate", "0"], "0 is no rate of an execution context"),
+        (["A", "--rate", "nan"], "nan is no rate of an execution context"),
+        (["A", "--service", "a:b c:C", "--service-idl", "x"], "'b c' cannot be the name of an interface"),
         (["A", "--service", "a:b", "--service-idl", "x"], "--service a:b: write PORT:INSTANCE:TYPE"),
         (["A", "--service", "a:b:C"], "--service-idl: give one IDL file for all"),
         (["A", "--service", "a:b:C", "--service-idl", "none.idl"], "none.idl: cannot be read: No such file"),
