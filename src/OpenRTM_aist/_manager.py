@@ -12,11 +12,11 @@ from contextlib import AbstractContextManager, nullcontext
 from inspect import isfunction
 from typing import Any, ClassVar
 
-from muros.findings import Finding
 from muros.rtc.codes import RtcError
 from muros.rtc.component import Component
 from muros.rtc.manager import Manager as Core
 from muros.rtc.manager import ended_by_signals, parse_options, read_settings
+from muros.rtc.manager._serve import FAILED, WRONG_USE, fail, show
 from muros.rtc.properties import ConfError
 from OpenRTM_aist._adapter import Adapter
 from OpenRTM_aist._components import Logger, RTObject_impl, _Behind
@@ -24,8 +24,6 @@ from OpenRTM_aist._naming_manager import NamingManager
 from OpenRTM_aist._properties import Properties
 
 __all__ = ["Manager"]
-
-WRONG_USE = 2
 
 
 class Manager:
@@ -54,9 +52,8 @@ class Manager:
                 settings = read_settings(parse_options(argv[1:]), environment=os.environ)
                 Manager._one = Manager(Core(settings))
             except ConfError as error:
-                print(f"muros: {error}", file=sys.stderr)
-                sys.exit(WRONG_USE)
-            Manager._one.core.reporter.on_finding(_show)
+                sys.exit(fail(error, WRONG_USE))
+            Manager._one.core.reporter.on_finding(show)
         return Manager._one
 
     @staticmethod
@@ -86,7 +83,7 @@ class Manager:
             with self._ended_by_signals():
                 self.core.start(lambda core: self._init(self) if self._init is not None else None)
         except RtcError as error:
-            print(f"muros: {error}", file=sys.stderr)
+            fail(error, FAILED)
             self._close()
             return False
         return True
@@ -260,7 +257,3 @@ for _name, _value in vars(Manager).items():
 
 def _outer(component: Component) -> Any:
     return component.outer if isinstance(component, _Behind) else component
-
-
-def _show(finding: Finding) -> None:
-    print(finding.format(), file=sys.stderr, flush=True)

@@ -18,10 +18,12 @@ from muros.rtc.manager._settings import Options, parse_options, read_settings
 from muros.rtc.manager._signals import ended_by_signals
 from muros.rtc.properties import ConfError, Properties
 
-__all__ = ["serve", "serve_files", "serve_manager"]
+__all__ = ["FAILED", "WRONG_USE", "fail", "serve", "serve_files", "serve_manager", "show"]
 
 FAILED: Final = 1
+"""The exit status where the ORB does not start or a component cannot be made."""
 WRONG_USE: Final = 2
+"""The exit status where the settings cannot be."""
 
 OWN_WAY: Final = "MyModuleInit"
 """By this function a file of OpenRTM-aist registers and makes what it is to run as a program."""
@@ -56,7 +58,7 @@ def serve_files(argv: Sequence[str]) -> int:
             if not file.is_file():
                 raise ConfError(f"{file}: no such file")
     except ConfError as error:
-        return _fail(error, WRONG_USE)
+        return fail(error, WRONG_USE)
 
     def init(manager: Manager) -> None:
         for file in files:
@@ -90,7 +92,7 @@ def _options(argv: Sequence[str]) -> Options | int:
         if options.words:
             raise ConfError(f"{options.words[0]!r} is no option of a manager")
     except ConfError as error:
-        return _fail(error, WRONG_USE)
+        return fail(error, WRONG_USE)
     return options
 
 
@@ -106,8 +108,8 @@ def _serve(options: Options, init: Callable[[Manager], object] | None) -> int:
     try:
         manager = Manager(read_settings(options, environment=os.environ))
     except ConfError as error:
-        return _fail(error, WRONG_USE)
-    manager.reporter.on_finding(_show)
+        return fail(error, WRONG_USE)
+    manager.reporter.on_finding(show)
 
     try:
         with ended_by_signals(manager.shutdown):
@@ -119,9 +121,9 @@ def _serve(options: Options, init: Callable[[Manager], object] | None) -> int:
             finally:
                 manager.close()
     except ConfError as error:
-        return _fail(error, WRONG_USE)
+        return fail(error, WRONG_USE)
     except RtcError as error:
-        return _fail(error, FAILED)
+        return fail(error, FAILED)
     return 0
 
 
@@ -141,10 +143,12 @@ def _greet(manager: Manager) -> None:
     )
 
 
-def _show(finding: Finding) -> None:
+def show(finding: Finding) -> None:
+    """Write a finding on standard error."""
     print(finding.format(), file=sys.stderr, flush=True)
 
 
-def _fail(error: Exception, status: int) -> int:
+def fail(error: Exception, status: int) -> int:
+    """Say in a line why there is no manager; `status`."""
     print(f"muros: {error}", file=sys.stderr)
     return status
