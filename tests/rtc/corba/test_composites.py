@@ -7,7 +7,15 @@ import pytest
 
 from muros.findings import Finding
 from muros.rtc.composite import PeriodicECSharedComposite
-from muros.rtc.corba import NameServer, Objects, Orb, RunningNameServer, set_up
+from muros.rtc.corba import (
+    NameServer,
+    Objects,
+    Orb,
+    RunningNameServer,
+    _configuration,
+    _organization,
+    set_up,
+)
 from muros.rtc.corba._conversion import to_nv_list
 from muros.rtc.corba._organization import ForeignMember
 from muros.rtc.corba._stubs import RTC, OpenRTM, OpenRTM__POA, SDOPackage
@@ -134,6 +142,22 @@ def test_editors_change_the_members(world: World, composed: Composed) -> None:
     for missing in (organization.remove_organization_property, organization.get_organization_property_value):
         with pytest.raises(SDOPackage.InvalidParameter):
             missing("a")
+
+
+def test_others_can_not_fill_the_memory(composed: Composed, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_organization, "PROPERTIES", 2)
+    monkeypatch.setattr(_configuration, "ORGANIZATIONS", 1)
+    (organization,) = composed.reference.get_owned_organizations()
+    values = to_nv_list({"a": "1", "b": "2"})
+    assert organization.add_organization_property(SDOPackage.OrganizationProperty(values))
+    assert organization.set_organization_property_value("b", values[0].value)
+    with pytest.raises(SDOPackage.NotAvailable, match="2 properties at most"):
+        organization.set_organization_property_value("c", values[0].value)
+    configuration = composed.reference.get_configuration()
+    assert configuration.add_organization(organization)
+    with pytest.raises(SDOPackage.NotAvailable, match="1 organizations at most"):
+        configuration.add_organization(organization)
+    assert configuration.remove_organization(organization.get_organization_id())
 
 
 def test_a_composite_that_shows_foreign_ports_is_observed(orb: Orb, composed: Composed) -> None:

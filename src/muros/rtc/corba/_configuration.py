@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from omniORB import CORBA
 
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from muros.rtc.corba._observer import Observers
 
 __all__ = ["ConfigurationServant", "no_device"]
+
+ORGANIZATIONS: Final = 1000
+"""Organizations that a component may be in before others can add it to no more."""
 
 
 def no_device() -> Any:
@@ -121,7 +124,10 @@ class ConfigurationServant(SDOPackage__POA.Configuration):  # type: ignore[misc]
             id_ = org.get_organization_id()
         except CORBA.Exception as error:
             raise SDOPackage.InvalidParameter("the organization does not answer") from error
-        organizations_of(self._component).join(id_, self._objects.organization_behind(org))
+        organizations = organizations_of(self._component)
+        if len(organizations.joined) >= ORGANIZATIONS:
+            raise SDOPackage.NotAvailable(f"a component is in {ORGANIZATIONS} organizations at most")
+        organizations.join(id_, self._objects.organization_behind(org))
         return True
 
     def remove_organization(self, organization_id: str) -> bool:

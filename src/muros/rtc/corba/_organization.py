@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 __all__ = ["ForeignMember", "OrganizationServant"]
 
+PROPERTIES: Final = 1000
+"""Properties that an organization may have before others can add no more."""
+
 
 class OrganizationServant(SDOPackage__POA.Organization):  # type: ignore[misc]
     """SDOPackage::Organization. SDO 1.1, 2.6."""
@@ -38,13 +41,13 @@ class OrganizationServant(SDOPackage__POA.Organization):  # type: ignore[misc]
         return self.organization.properties[self._known(name)]
 
     def add_organization_property(self, organization_property: Any) -> bool:
-        self.organization.properties.update({one.name: one.value for one in organization_property.properties})
+        self._put({one.name: one.value for one in organization_property.properties})
         return True
 
     def set_organization_property_value(self, name: str, value: Any) -> bool:
         if not name:
             raise SDOPackage.InvalidParameter("the name of the property is empty")
-        self.organization.properties[name] = value
+        self._put({name: value})
         return True
 
     def remove_organization_property(self, name: str) -> bool:
@@ -82,6 +85,12 @@ class OrganizationServant(SDOPackage__POA.Organization):  # type: ignore[misc]
     def set_dependency(self, dependency: Any) -> bool:
         self.organization.dependency = Dependency(dependency._v)
         return True
+
+    def _put(self, values: dict[str, Any]) -> None:
+        properties = self.organization.properties
+        if len(properties.keys() | values.keys()) > PROPERTIES:
+            raise SDOPackage.NotAvailable(f"an organization has {PROPERTIES} properties at most")
+        properties.update(values)
 
     def _known(self, name: str) -> str:
         if name not in self.organization.properties:
