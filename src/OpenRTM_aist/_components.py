@@ -22,7 +22,14 @@ from OpenRTM_aist._adapter import Adapter
 from OpenRTM_aist._codes import codes, to_code
 from OpenRTM_aist._config_admin import ConfigAdmin, to_properties
 from OpenRTM_aist._data_ports import InPort, OutPort
-from OpenRTM_aist._ports import PortBase
+from OpenRTM_aist._listening import Listening, Registry
+from OpenRTM_aist._ports import (
+    PortBase,
+    PortConnectListenerType,
+    PortConnectRetListenerType,
+    connect_call,
+    connect_ret_call,
+)
 from OpenRTM_aist._properties import Properties
 from OpenRTM_aist._strings import stringTo
 
@@ -273,7 +280,7 @@ class RTObject_impl:  # noqa: N801
 
     def __init__(self, manager: Any = None, orb: Any = None, poa: Any = None) -> None:
         self._behind = _Behind(self)
-        self._wrapped: dict[tuple[int, Any], Callable[..., Any]] = {}
+        self._listening = Listening()
         self._manager = manager
         self._rtcout = Logger(type(self).__name__)
 
@@ -484,10 +491,12 @@ class RTObject_impl:  # noqa: N801
     def addPreComponentActionListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
     ) -> Callable[..., Any]:
-        return self._behind.listeners.add(PreComponentActionListenerType.event(listener_type), listener)
+        event = PreComponentActionListenerType.event(listener_type)
+        return self._listening.begin(event, listener, listener, self._behind.listeners)
 
     def removePreComponentActionListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
-        self._behind.listeners.remove(PreComponentActionListenerType.event(listener_type), listener)
+        event = PreComponentActionListenerType.event(listener_type)
+        self._listening.end(event, listener, self._behind.listeners)
 
     def addPostComponentActionListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
@@ -495,14 +504,12 @@ class RTObject_impl:  # noqa: N801
         def call(handle: int, code: ReturnCode) -> None:
             listener(handle, to_code(code))
 
-        self._wrapped[listener_type, listener] = call
-        self._behind.listeners.add(PostComponentActionListenerType.event(listener_type), call)
-        return listener
+        event = PostComponentActionListenerType.event(listener_type)
+        return self._listening.begin(event, listener, call, self._behind.listeners)
 
     def removePostComponentActionListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
-        call = self._wrapped.pop((listener_type, listener), None)
-        if call is not None:
-            self._behind.listeners.remove(PostComponentActionListenerType.event(listener_type), call)
+        event = PostComponentActionListenerType.event(listener_type)
+        self._listening.end(event, listener, self._behind.listeners)
 
     def addPortActionListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
@@ -510,35 +517,51 @@ class RTObject_impl:  # noqa: N801
         def call(port: Port) -> None:
             listener(port.profile())
 
-        self._behind.listeners.add(PortActionListenerType.event(listener_type), call)
-        return listener
+        event = PortActionListenerType.event(listener_type)
+        return self._listening.begin(event, listener, call, self._behind.listeners)
+
+    def removePortActionListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
+        self._listening.end(PortActionListenerType.event(listener_type), listener, self._behind.listeners)
 
     def addExecutionContextActionListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
     ) -> Callable[..., Any]:
-        return self._behind.listeners.add(ExecutionContextActionListenerType.event(listener_type), listener)
+        event = ExecutionContextActionListenerType.event(listener_type)
+        return self._listening.begin(event, listener, listener, self._behind.listeners)
+
+    def removeExecutionContextActionListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
+        event = ExecutionContextActionListenerType.event(listener_type)
+        self._listening.end(event, listener, self._behind.listeners)
 
     def addPortConnectListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
     ) -> Callable[..., Any]:
         """At all ports that the component has."""
-        for port in self._behind.ports:
-            PortBase(port).addPortConnectListener(listener_type, listener)
-        return listener
+        event = PortConnectListenerType.event(listener_type)
+        return self._listening.begin(event, listener, connect_call(listener), *self._connects())
+
+    def removePortConnectListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
+        self._listening.end(PortConnectListenerType.event(listener_type), listener, *self._connects())
 
     def addPortConnectRetListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
     ) -> Callable[..., Any]:
         """At all ports that the component has."""
-        for port in self._behind.ports:
-            PortBase(port).addPortConnectRetListener(listener_type, listener)
-        return listener
+        event = PortConnectRetListenerType.event(listener_type)
+        return self._listening.begin(event, listener, connect_ret_call(listener), *self._connects())
+
+    def removePortConnectRetListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
+        self._listening.end(PortConnectRetListenerType.event(listener_type), listener, *self._connects())
 
     def addConfigurationParamListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
     ) -> Callable[..., Any]:
         event = ConfigurationParamListenerType.event(listener_type)
-        return self._behind.configuration.listeners.add(event, listener)
+        return self._listening.begin(event, listener, listener, self._behind.configuration.listeners)
+
+    def removeConfigurationParamListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
+        event = ConfigurationParamListenerType.event(listener_type)
+        self._listening.end(event, listener, self._behind.configuration.listeners)
 
     def addConfigurationSetListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
@@ -546,14 +569,25 @@ class RTObject_impl:  # noqa: N801
         def call(one: ConfigurationSet) -> None:
             listener(to_properties(one))
 
-        self._behind.configuration.listeners.add(ConfigurationSetListenerType.event(listener_type), call)
-        return listener
+        event = ConfigurationSetListenerType.event(listener_type)
+        return self._listening.begin(event, listener, call, self._behind.configuration.listeners)
+
+    def removeConfigurationSetListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
+        event = ConfigurationSetListenerType.event(listener_type)
+        self._listening.end(event, listener, self._behind.configuration.listeners)
 
     def addConfigurationSetNameListener(
         self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
     ) -> Callable[..., Any]:
         event = ConfigurationSetNameListenerType.event(listener_type)
-        return self._behind.configuration.listeners.add(event, listener)
+        return self._listening.begin(event, listener, listener, self._behind.configuration.listeners)
+
+    def removeConfigurationSetNameListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
+        event = ConfigurationSetNameListenerType.event(listener_type)
+        self._listening.end(event, listener, self._behind.configuration.listeners)
+
+    def _connects(self) -> list[Registry]:
+        return [port.connect_listeners for port in self._behind.ports if isinstance(port, Port)]
 
     # What others may ask of the component, for those that ask it here
 

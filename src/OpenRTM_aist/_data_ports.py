@@ -216,14 +216,11 @@ class _DataPort(PortBase):
         def call(info: Info, value: Any) -> Any:
             return listener(ConnectorInfo(info), value)
 
-        self._listeners[listener_type, listener] = call
-        self.port.add_listener(ConnectorDataListenerType.event(listener_type), call)
-        return listener
+        event = ConnectorDataListenerType.event(listener_type)
+        return self._listening.begin(event, listener, call, self.port.listeners)
 
     def removeConnectorDataListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
-        call = self._listeners.pop((listener_type, listener), None)
-        if call is not None:
-            self.port.remove_listener(ConnectorDataListenerType.event(listener_type), call)
+        self._listening.end(ConnectorDataListenerType.event(listener_type), listener, self.port.listeners)
 
     def addConnectorListener(
         self, callback_type: int, listener: Callable[..., Any], autoclean: bool = True
@@ -233,14 +230,11 @@ class _DataPort(PortBase):
         def call(info: Info) -> Any:
             return listener(ConnectorInfo(info))
 
-        self._listeners[~callback_type, listener] = call
-        self.port.add_listener(ConnectorListenerType.event(callback_type), call)
-        return listener
+        event = ConnectorListenerType.event(callback_type)
+        return self._listening.begin(event, listener, call, self.port.listeners)
 
     def removeConnectorListener(self, callback_type: int, listener: Callable[..., Any]) -> None:
-        call = self._listeners.pop((~callback_type, listener), None)
-        if call is not None:
-            self.port.remove_listener(ConnectorListenerType.event(callback_type), call)
+        self._listening.end(ConnectorListenerType.event(callback_type), listener, self.port.listeners)
 
     def getPortDataType(self) -> str:
         return str(self.port.data_type.repository_id)

@@ -9,6 +9,7 @@ from typing import Any
 from muros.rtc.ports import ConnectEvent, ConnectEventKind, Port
 from muros.rtc.profiles import ConnectorProfile
 from OpenRTM_aist._codes import to_code, to_connector_profile
+from OpenRTM_aist._listening import Listening
 from OpenRTM_aist._properties import Properties
 
 __all__ = [
@@ -17,6 +18,8 @@ __all__ = [
     "PortConnectListenerType",
     "PortConnectRetListener",
     "PortConnectRetListenerType",
+    "connect_call",
+    "connect_ret_call",
     "port_reference",
 ]
 
@@ -68,7 +71,7 @@ class PortBase:
         self.port = port
         self.wishes: dict[str, str] = {}
         """What holds where neither rtc.conf nor the connection says otherwise."""
-        self._listeners: dict[tuple[int, Any], Callable[..., Any]] = {}
+        self._listening = Listening()
 
     def name(self) -> str:
         """The name given: `in`."""
@@ -123,25 +126,42 @@ class PortBase:
     def disconnect_all(self) -> Any:
         return to_code(self.port.disconnect_all())
 
-    def addPortConnectListener(self, listener_type: int, listener: Callable[..., Any]) -> Callable[..., Any]:
+    def addPortConnectListener(
+        self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
+    ) -> Callable[..., Any]:
         """Tell `listener(port name, profile)` of a moment of `PortConnectListenerType`."""
-        return self._listen(PortConnectListenerType.event(listener_type), listener, with_code=False)
+        event = PortConnectListenerType.event(listener_type)
+        return self._listening.begin(event, listener, connect_call(listener), self.port.connect_listeners)
+
+    def removePortConnectListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
+        event = PortConnectListenerType.event(listener_type)
+        self._listening.end(event, listener, self.port.connect_listeners)
 
     def addPortConnectRetListener(
-        self, listener_type: int, listener: Callable[..., Any]
+        self, listener_type: int, listener: Callable[..., Any], autoclean: bool = True
     ) -> Callable[..., Any]:
         """Tell `listener(port name, profile, code)` of a moment of `PortConnectRetListenerType`."""
-        return self._listen(PortConnectRetListenerType.event(listener_type), listener, with_code=True)
+        event = PortConnectRetListenerType.event(listener_type)
+        return self._listening.begin(event, listener, connect_ret_call(listener), self.port.connect_listeners)
 
-    def _listen(
-        self, kind: ConnectEventKind, listener: Callable[..., Any], *, with_code: bool
-    ) -> Callable[..., Any]:
-        def call(event: ConnectEvent) -> None:
-            code = event.code if with_code else None
-            listener(event.port.name, _profile(event.profile), *(() if code is None else (to_code(code),)))
+    def removePortConnectRetListener(self, listener_type: int, listener: Callable[..., Any]) -> None:
+        event = PortConnectRetListenerType.event(listener_type)
+        self._listening.end(event, listener, self.port.connect_listeners)
 
-        self.port.connect_listeners.add(kind, call)
-        return listener
+
+def connect_call(listener: Callable[..., Any]) -> Callable[[ConnectEvent], None]:
+    """What tells a `PortConnectListener`."""
+    return lambda event: listener(event.port.name, _profile(event.profile))
+
+
+def connect_ret_call(listener: Callable[..., Any]) -> Callable[[ConnectEvent], None]:
+    """What tells a `PortConnectRetListener`."""
+
+    def call(event: ConnectEvent) -> None:
+        assert event.code is not None
+        listener(event.port.name, _profile(event.profile), to_code(event.code))
+
+    return call
 
 
 def _profile(profile: ConnectorProfile) -> Any:

@@ -9,6 +9,7 @@ import pytest
 import OpenRTM_aist as rtm
 import RTC
 import RTC__POA
+from muros.rtc.listeners import Listeners
 from tests.rtc.shim.stage import COMPONENTS
 
 
@@ -363,6 +364,33 @@ def test_actions_and_configuration_are_listened_to(manager: rtm.Manager) -> None
     assert heard == ["Listening0.service", ("pre", 0), ("post", 0, True), "fast"]
     listening.get_configuration().add_configuration_set(_set("slow"))
     assert heard[-1] == "slow"
+
+
+def test_all_listeners_can_be_removed(manager: rtm.Manager) -> None:
+    ports = make(manager, Ports)
+    registries: list[Listeners[Any]] = [
+        ports._behind.listeners,
+        ports._behind.configuration.listeners,
+        *(port.port.connect_listeners for port in (ports.out, ports.into)),
+        ports.out.port.listeners._data,
+        ports.out.port.listeners._connector,
+    ]
+
+    def standing() -> list[dict[Any, Any]]:
+        return [{kind: calls for kind, calls in one._callbacks.items() if calls} for one in registries]
+
+    def listener(*arguments: Any) -> None: ...
+
+    before = standing()
+    for owner in (ports, ports.out):
+        names = [name for name in dir(owner) if name.startswith("add") and name.endswith("Listener")]
+        assert len(names) >= 4
+        for name in names:
+            assert getattr(owner, name)(0, listener, True) is listener
+            assert standing() != before, name
+            for _ in range(2):
+                getattr(owner, name.replace("add", "remove", 1))(0, listener)
+            assert standing() == before, name
 
 
 def _set(name: str) -> Any:
