@@ -47,9 +47,7 @@ class Turnstile:
         self._sleeping = False  # whether there is a leader
         self._followers = 0
         self._end = 0  # the tick at which the leader gets up
-        self._sooner: int | None = (
-            None  # the first tick at which something is due that the next leader may not know of
-        )
+        self._sooner: int | None = None  # the tick by which the next leader is to get up, whatever it means to do
         self._threads = 0
         self.several = False
         """Whether more than one thread looks at the session, or wakes those who wait."""
