@@ -47,7 +47,7 @@ class Turnstile:
         self._sleeping = False  # whether there is a leader
         self._followers = 0
         self._end = 0  # the tick at which the leader gets up
-        self._sooner: int | None = None  # the tick by which the next leader is to get up, whatever it means to do
+        self._sooner: int | None = None  # the tick by which the next leader gets up, if any
         self._threads = 0
         self.several = False
         """Whether more than one thread looks at the session, or wakes those who wait."""
