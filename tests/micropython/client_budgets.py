@@ -69,16 +69,23 @@ SMALL_CORE = """
 from muros.client import Session, TimeSync
 from muros.rclc import Context, Executor
 
+session = Session(transport)
 context = Context(session)
 node = context.node("board")
 publisher = node.publisher(Number, "number")
 node.subscription(Number, "number", print)
-node.timer(1.0, print)
-node.service(Add, "add", answer)
-node.client(Add, "add")
-TimeSync(session)
-Executor(context).spin()
+node.timer(1.0, publish)
+node.service(Add, "add_two_ints", answer)
+client = node.client(Add, "add_two_ints")
+time = TimeSync(session)
+executor = Executor(context)
+while context.ping():
+    time.request()
+    client.send(Add.Request(), print)
+    publisher.publish(Number(data=time.time()[0]))
+    executor.spin_some(1.0)
 """
+"""A program with everything that the core is for; its transport is not counted."""
 
 WHOLE = """
 compat exports

@@ -2,7 +2,6 @@
 
 from struct import pack_into
 
-from muros.client.link import WAITING, enter
 from muros.compat import borrow, const
 from muros.xrce.session import control
 
@@ -13,6 +12,7 @@ if TYPE_CHECKING:
     from muros.client.session import Session
     from muros.xrce._types import Buffer
 
+_WAITING = const(0)
 _DELETE = const(3)
 _OBJECT_CLIENT = const(0xFFFE)
 _REQUEST_LOGOUT = const(2)
@@ -52,7 +52,10 @@ def close(session: "Session", left: int = _TIMEOUT) -> None:
     session.send = closed.send
     session.up = False
     session.login = True
-    enter(session, WAITING)
+    if session.state:
+        session.state = _WAITING
+        if session.on_state is not None:
+            session.on_state(_WAITING)
     if session.backlog is not None:
         borrow("muros.client.pieces").close(session.backlog)
 

@@ -1,4 +1,4 @@
-"""Names that MicroPython's firmware has, so that they cost a program nothing, see ``_small``."""
+"""Names that MicroPython's firmware has, so that they cost a program nothing, see the package."""
 
 STATIC = """
 ArithmeticError AssertionError AttributeError BaseException EOFError Ellipsis Exception GeneratorExit

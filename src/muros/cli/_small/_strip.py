@@ -1,4 +1,4 @@
-"""What a board's program does without, taken out of a module: see ``_small``."""
+"""What a board's program does without, taken out of a module: see the package."""
 
 from __future__ import annotations
 

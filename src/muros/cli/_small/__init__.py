@@ -1,0 +1,86 @@
+"""The board floor made small for one program: the same modules, with shorter names and fewer files.
+
+A board keeps every name of its code in memory, about 20 bytes each, and no collector frees them; a module takes some
+300 bytes beside its code. ``small`` rewrites the syntax trees of the floor for a program that it can read:
+
+- A name of the floor's own that the program does not say becomes one that every firmware has anyway, ``pow`` or
+  ``KeyError``. Such a name costs nothing. One map holds for all modules and for all kinds of names, and two names never
+  become one, so whatever referred to the same thing still does, and nothing needs to be known about scopes and types.
+- Modules that the program keeps in memory all the time are joined into the package ``muros`` itself.
+- Constants are put where they are used; docstrings, annotations and functions that nothing mentions go.
+
+Kept are: words of the program; names in strings of the floor, as for ``getattr``; names of messages; what firmware
+offers. So a program that says what it uses runs unchanged. What it does not say it cannot find.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable
+
+from muros.cli._floor import Tree, is_native
+from muros.cli._small._bundles import HOME
+from muros.cli._small._exports import find_exports
+from muros.cli._small._inline import inline
+from muros.cli._small._join import join, moved
+from muros.cli._small._names import COMMON, OFFERED, STATIC
+from muros.cli._small._program import Programs
+from muros.cli._small._prune import prune
+from muros.cli._small._reach import Reach
+from muros.cli._small._rename import Renamer, own, share_arguments, shortened, strings
+from muros.cli._small._strip import strip
+from muros.cli._small._trees import Modules, defined, identifiers
+
+_PACKAGE = "/__init__.py"
+_PASSES = 3  # what nobody reads any more is known after the first
+_FIRMWARE = OFFERED.union(STATIC, COMMON)
+
+
+def small(tree: Tree, programs: Iterable[str]) -> tuple[Tree, dict[str, str]]:
+    """The tree for these programs, given as texts, and the name that each renamed name had.
+
+    ``tree`` holds sources: the board floor, and message classes, whose own names stay. Native modules stay as they are.
+    Raises SyntaxError for a source that is not Python.
+    """
+    said = Programs(programs)
+    floor: Modules = {}
+    messages: Modules = {}
+    rest: Tree = {}
+    packages = set()
+    for path, content in tree.items():
+        if not path.endswith(".py") or is_native(content):
+            rest[path] = content
+            continue
+        name = path.removesuffix(_PACKAGE).removesuffix(".py").replace("/", ".")
+        packages.update([name] if path.endswith(_PACKAGE) else [])
+        (floor if name.split(".")[0] == HOME else messages)[name] = ast.parse(content)
+    native = {path.removesuffix(".py").replace("/", "."): path for path in rest if path.endswith(".py")}
+    of_native = set[str]().union(*(defined(ast.parse(rest[path])) for path in native.values()))
+    for name, path in native.items():
+        rest[moved(name).replace(".", "/") + ".py"] = rest.pop(path)
+    floor = {name: strip(node, {*native, *floor}) for name, node in floor.items()}
+    floor = _reached(floor, messages, of_native, said)
+    kept = said.words | OFFERED | of_native | strings([*floor.values(), *messages.values()]) | own(messages)
+    modules = join(floor, messages, native, said)
+    inline(modules, messages, kept, said.named)
+    used = identifiers(*modules.values(), *messages.values()) | kept
+    share_arguments(modules.values(), kept, used)
+    names = shortened(modules, kept, used | identifiers(*modules.values()))
+    out = dict(rest)
+    for name, node in (modules | messages).items():
+        ast.fix_missing_locations(Renamer(names, {*modules, *native}).visit(node))
+        path = name.replace(".", "/") + (_PACKAGE if name in packages else ".py")
+        out[path] = ast.unparse(node).encode()
+    return out, {new: old for old, new in sorted(names.items())}
+
+
+def _reached(floor: Modules, messages: Modules, of_native: set[str], said: Programs) -> Modules:
+    """What the programs reach; each pass knows what the one before has left."""
+    find_exports(floor, said.asked)
+    readers = [*messages.values(), *said.trees]
+    foreign = said.defines() | of_native | identifiers(*messages.values())
+    for _ in range(_PASSES):
+        reach = Reach(floor, said.hidden | of_native | _FIRMWARE, said.hidden | of_native)
+        reach.find({HOME, *said.named}, readers)
+        floor = prune(floor, reach, foreign)
+    return floor

@@ -1,0 +1,93 @@
+"""Syntax trees of modules, and what is asked of them in several places."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+
+WORD = re.compile(r"[^\W\d]\w*")
+
+Modules = dict[str, ast.Module]
+"""Syntax trees by module, named with dots."""
+
+Function = ast.FunctionDef | ast.Lambda
+
+
+def defined(tree: ast.Module) -> set[str]:
+    """What a module defines at its top, without what it imports."""
+    names: set[str] = set()
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Assign):
+            names.update(target.id for target in node.targets if isinstance(target, ast.Name))
+    return names
+
+
+def stored(node: ast.AST) -> Iterator[str]:
+    """The variables that code gives values."""
+    for one in ast.walk(node):
+        match one:
+            case ast.Name(id=name, ctx=ast.Store() | ast.Del()):
+                yield name
+            case ast.ExceptHandler(name=str(name)):
+                yield name
+            case ast.alias(name=name, asname=other):
+                yield other or name.split(".")[0]
+
+
+def variables(function: Function) -> set[str]:
+    """The names that are a function's own, those of functions in it too."""
+    arguments = {one.arg for one in ast.walk(function) if isinstance(one, ast.arg)}
+    shared = {name for one in ast.walk(function) if isinstance(one, ast.Global) for name in one.names}
+    return (arguments | set(stored(function))) - shared
+
+
+def names_of(node: ast.AST) -> Iterator[str]:
+    """Whatever is a name in one node."""
+    match node:
+        case ast.Name(id=name) | ast.Attribute(attr=name) | ast.arg(arg=name):
+            yield name
+        case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+            yield name
+        case ast.keyword(arg=str(name)) | ast.ExceptHandler(name=str(name)):
+            yield name
+        case ast.alias(name=name, asname=other):
+            yield from name.split(".")
+            if other:
+                yield other
+
+
+def identifiers(*trees: ast.Module) -> set[str]:
+    """Whatever is a name in these modules."""
+    return {name for tree in trees for node in ast.walk(tree) for name in names_of(node)}
+
+
+def is_plain(node: ast.expr) -> bool:
+    """Whether it is a name, or attributes of one."""
+    while isinstance(node, ast.Attribute):
+        node = node.value
+    return isinstance(node, ast.Name)
+
+
+def literal(value: object) -> ast.expr:
+    """An expression with a constant's value."""
+    return ast.parse(repr(value), mode="eval").body
+
+
+def wholes(tree: ast.AST) -> set[str]:
+    """The strings in code but those by which it takes one thing of a module: they may lend its functions.
+
+    The others are ``borrow("module").name`` and ``__import__("module", ...).name``.
+    """
+    direct = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.Attribute(value=ast.Call(func=ast.Name(id="borrow" | "__import__"), args=[text, *_])):
+                direct.add(id(text))
+    return {
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in direct
+    }
