@@ -5,7 +5,7 @@ It sends raw submessages to a `Bench`, acknowledges what it gets unless told not
 
 import struct
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from muros.client.qos import Qos
 from muros.xrce import create
@@ -35,11 +35,14 @@ from muros.xrce.constants import (
 )
 from tests.agent.replay import Bench
 
+if TYPE_CHECKING:
+    from muros.xrce.create import Asked
+
 PARTICIPANT, TOPIC, PUBLISHER, SUBSCRIBER, WRITER, READER = 0x0011, 0x0012, 0x0013, 0x0014, 0x0015, 0x0016
 REQUESTER, REPLIER = 0x0017, 0x0018
-RELIABLE = Qos(reliable=True, depth=10)
-KEEP_ALL = Qos(reliable=True, keep_all=True)
-BEST_EFFORT = Qos(reliable=False, depth=5)
+RELIABLE = Qos(reliable=True, depth=10).asked()
+KEEP_ALL = Qos(reliable=True, keep_all=True).asked()
+BEST_EFFORT = Qos(reliable=False, depth=5).asked()
 
 
 @dataclass(frozen=True)
@@ -212,7 +215,7 @@ class Raw:
     # Entities of a usual client
 
     def tree(
-        self, topic: str = "rt/chatter", type_name: str = "T", qos: Qos = RELIABLE, name: str = "node"
+        self, topic: str = "rt/chatter", type_name: str = "T", qos: "Asked" = RELIABLE, name: str = "node"
     ) -> "Raw":
         """Makes a participant, a topic, a publisher with a writer and a subscriber with a reader."""
         self.base(topic, type_name, name)

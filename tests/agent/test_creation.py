@@ -452,16 +452,16 @@ def test_a_service_meets_the_space() -> None:
 @pytest.mark.parametrize(
     ("qos", "words"),
     [
-        (Qos(reliable=True, depth=3), "reliable, volatile, keep last 3"),
-        (Qos(reliable=False, depth=1), "best effort, volatile, keep last 1"),
-        (Qos(keep_all=True, durability="transient_local"), "reliable, transient local, keep all"),
+        (Qos(reliable=True, depth=3).asked(), "reliable, volatile, keep last 3"),
+        (Qos(reliable=False, depth=1).asked(), "best effort, volatile, keep last 1"),
+        (Qos(keep_all=True, durability="transient_local").asked(), "reliable, transient local, keep all"),
         (
-            Qos(depth=2, deadline=100, lifespan=50),
+            Qos(depth=2, deadline=100, lifespan=50).asked(),
             "reliable, volatile, keep last 2, deadline 100 ms, lifespan 50 ms",
         ),
     ],
 )
-def test_qos_in_binary_reaches_the_space(qos: Qos, words: str) -> None:
+def test_qos_in_binary_reaches_the_space(qos: tuple[int, int, int, int], words: str) -> None:
     bench = Bench()
     client = Raw(bench).base()
     assert client.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER)) == STATUS_OK
@@ -495,7 +495,7 @@ def test_partitions_in_xml_reach_the_space(whose: str) -> None:
 
 def test_a_late_reader_gets_what_was_kept_for_it() -> None:
     bench = Bench()
-    qos = Qos(depth=3, durability="transient_local")
+    qos = Qos(depth=3, durability="transient_local").asked()
     writer = Raw(bench, "w", 1).base()
     writer.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER))
     for n in range(5):

@@ -146,6 +146,6 @@ def variant(entity: "Entity", step: int) -> "Any":
 
 def _reading(entity: "Entity") -> bytes:
     """The read specification: by default everything, for ever."""
-    stream_id = _STREAM_RELIABLE if entity.qos.flags & _QOS_RELIABLE else _STREAM_BEST_EFFORT
+    stream_id = _STREAM_RELIABLE if entity.qos[0] & _QOS_RELIABLE else _STREAM_BEST_EFFORT
     samples, seconds, rate, pace = getattr(entity, "limits", (UNLIMITED, 0, 0, 0))
     return binary.read_data(stream_id, samples, seconds, rate, pace)

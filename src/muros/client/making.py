@@ -115,7 +115,7 @@ def enter(
 
     What cannot be is complained about now, not when the agent is asked for it.
     """
-    made.qos = profile(qos)
+    made.qos = profile(qos).asked()
     made.type_name = type_name
     made.above = node.id >> 4
     if hasattr(made, "room"):  # a side of a service
@@ -125,7 +125,7 @@ def enter(
         dds_type(type_name)
         made.above |= (session.index(_KIND_TOPIC) << 4 | _KIND_TOPIC) << _PARENT_BITS
     if kind != _KIND_DATAREADER:
-        made.stream = output(session, made.qos.flags & _QOS_RELIABLE)
+        made.stream = output(session, made.qos[0] & _QOS_RELIABLE)
     _add(made, session, name, kind)
     if kind != _KIND_DATAWRITER:
         session.objects[made.id] = made

@@ -6,6 +6,8 @@ TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from typing import TypeAlias
 
+    from muros.xrce.create import Asked
+
     AnyQos: TypeAlias = "str | Qos"
 
 _RELIABLE = const(0x01)
@@ -43,6 +45,13 @@ class Qos:
         self.depth = 0 if keep_all else depth
         self.deadline = deadline
         self.lifespan = lifespan
+
+    def asked(self) -> "Asked":
+        """Flags, depth, deadline and lifespan, as the agent is asked for them.
+
+        Entities keep these: an object of this class would keep its module in a board's memory.
+        """
+        return self.flags, self.depth, self.deadline, self.lifespan
 
 
 def within(name: str, value: int, last: int) -> None:

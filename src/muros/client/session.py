@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from muros.client import entities, making, methods
     from muros.client._types import OnData, Outgoing, Transport
     from muros.client.backlog import Backlog
-    from muros.client.qos import Qos
     from muros.xrce._types import Buffer
+    from muros.xrce.create import Asked
     from muros.xrce.streams import Output
 
 _CONNECTED = const(2)
@@ -246,7 +246,7 @@ class Entity:
         todo: int  # bit i: step i has no good STATUS yet; bit 4: refused
         request: int  # the id of the request of step 0; those of the other steps come before it
         type_name: str
-        qos: "Qos"
+        qos: "Asked"
         above: int  # the topic's id << 12 | the participant's index
         domain: int
         stream: "Output"  # a writer's

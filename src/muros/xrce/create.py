@@ -10,15 +10,10 @@ from muros.compat import const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
-    from typing import Protocol
+    from typing import TypeAlias
 
-    class EndpointQos(Protocol):
-        """What a writer or a reader asks of the agent's middleware."""
-
-        flags: int
-        depth: int
-        deadline: int
-        lifespan: int
+    Asked: TypeAlias = tuple[int, int, int, int]
+    """What a writer or a reader asks of the agent's middleware: flags, depth, deadline and lifespan in ms."""
 
 
 _IN_BINARY = const(3)
@@ -43,16 +38,17 @@ def group(kind: int, parent: int) -> bytes:
 
 
 def endpoint(
-    kind: int, topic_id: int, qos: "EndpointQos", parent: int, name: str = "", type_name: str = ""
+    kind: int, topic_id: int, qos: "Asked", parent: int, name: str = "", type_name: str = ""
 ) -> bytes:
     """A datawriter or a datareader (``kind`` 5 or 6) of a publisher or subscriber.
 
     A depth, a deadline or a lifespan (both in ms) of 0 is left to the agent. The names of the topic are needed by
     the other formats only.
     """
-    blob = pack(">H", topic_id) + pack("<BxH", 1, qos.flags)
-    blob += pack("<BxH", 1, qos.depth) if qos.depth else b"\0"
-    for time in (qos.deadline, qos.lifespan):
+    flags, depth, deadline, lifespan = qos
+    blob = pack(">H", topic_id) + pack("<BxH", 1, flags)
+    blob += pack("<BxH", 1, depth) if depth else b"\0"
+    for time in (deadline, lifespan):
         blob += b"\1" + bytes(~len(blob) & 3) + pack("<I", time) if time else b"\0"
     return _variant(kind, parent, blob, bytes(2 if kind == _KIND_DATAWRITER else 3))
 

@@ -11,7 +11,7 @@ from muros.compat import const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
-    from muros.xrce.create import EndpointQos
+    from muros.xrce.create import Asked
 
 _BY_REFERENCE = const(1)
 _AS_XML = const(2)
@@ -44,20 +44,21 @@ class Xml:
         return by_text(kind, _AS_XML, "", parent)
 
     def endpoint(
-        self, kind: int, topic_id: int, qos: "EndpointQos", parent: int, name: str, type_name: str
+        self, kind: int, topic_id: int, qos: "Asked", parent: int, name: str, type_name: str
     ) -> bytes:
         """A datawriter or a datareader."""
-        qualities = _kind("reliability", "RELIABLE" if qos.flags & _QOS_RELIABLE else "BEST_EFFORT")
-        durability = qos.flags // _QOS_TRANSIENT_LOCAL & 7
+        flags, depth, deadline, lifespan = qos
+        qualities = _kind("reliability", "RELIABLE" if flags & _QOS_RELIABLE else "BEST_EFFORT")
+        durability = flags // _QOS_TRANSIENT_LOCAL & 7
         if durability:
             qualities += _kind("durability", _DURABILITIES[durability >> 1])
-        if qos.deadline:
-            qualities += _tag("deadline", _time("period", qos.deadline))
-        if qos.lifespan:
-            qualities += _tag("lifespan", _time("duration", qos.lifespan))
-        history = _tag("kind", "KEEP_LAST" if qos.flags & _QOS_KEEP_LAST else "KEEP_ALL")
-        if qos.flags & _QOS_KEEP_LAST and qos.depth:
-            history += _tag("depth", str(qos.depth))
+        if deadline:
+            qualities += _tag("deadline", _time("period", deadline))
+        if lifespan:
+            qualities += _tag("lifespan", _time("duration", lifespan))
+        history = _tag("kind", "KEEP_LAST" if flags & _QOS_KEEP_LAST else "KEEP_ALL")
+        if flags & _QOS_KEEP_LAST and depth:
+            history += _tag("depth", str(depth))
         text = (
             _tag("historyMemoryPolicy", "PREALLOCATED_WITH_REALLOC")
             + _tag("qos", qualities)
@@ -105,7 +106,7 @@ class Reference(Xml):
         return by_text(_KIND_TOPIC, _BY_REFERENCE, _profile(name) + "__t", parent)
 
     def endpoint(
-        self, kind: int, topic_id: int, qos: "EndpointQos", parent: int, name: str, type_name: str
+        self, kind: int, topic_id: int, qos: "Asked", parent: int, name: str, type_name: str
     ) -> bytes:
         """A datawriter or a datareader by its profile, ``chatter__dw`` or ``chatter__dr``."""
         suffix = "__dw" if kind == _KIND_DATAWRITER else "__dr"

@@ -124,7 +124,7 @@ class SessionEvents:
 
     def __init__(self, node: Node, owner: Any, entity: Any, names: Iterable[str]) -> None:
         self._owner = owner
-        self._period: int = entity.qos.deadline
+        self._period: int = entity.qos[2]
         self._clock = node.context.clock
         self._news: NewsReader | None = None
         if not COUNTS.keys().isdisjoint(names):
