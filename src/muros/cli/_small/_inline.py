@@ -15,8 +15,10 @@ from collections.abc import Callable, Collection, Iterator
 from muros.cli._small._bundles import HOME
 from muros.cli._small._frames import MOST
 from muros.cli._small._frames import words as frame
+from muros.cli._small._names import COMMON, STATIC
 from muros.cli._small._trees import WORD, Modules, names_of, stored, variables, wholes
 
+_FIRMWARE = frozenset([*STATIC, *COMMON])  # a method's name may be that of a list's
 _Body = list[ast.stmt]
 _Make = Callable[[ast.expr | None], _Body]
 
@@ -42,7 +44,7 @@ def inline(modules: Modules, messages: Modules, kept: Collection[str], named: Co
                 name = function.name
                 if name.startswith("__") or not _is_simple(function):
                     continue
-                alone = name not in kept and mentions[name] == 2
+                alone = name not in kept and mentions[name] == 2 and not (owner and name in _FIRMWARE)
                 if alone or (not owner and place not in unseen and uses[place, name] == 1):
                     _put_in_place(function, owner, tree, place == HOME)
 
@@ -126,6 +128,8 @@ class _Place:
         """
         for _, caller in _functions(tree):
             if caller is not self._function and any(self._is_call(node) for node in ast.walk(caller)):
+                if variables(caller) & _free(self._function):
+                    return  # what the function means by a name is another thing there
                 before, words = copy.deepcopy(caller.body), frame(caller)
                 try:
                     caller.body = self._in_body(caller.body, caller, True)
@@ -260,6 +264,11 @@ class _Place:
             body = _without_returns(body, make)
         self.done = True
         return before + (body or [ast.Pass()])
+
+
+def _free(function: ast.FunctionDef) -> set[str]:
+    """The names in a function that are not its own."""
+    return {node.id for node in ast.walk(function) if isinstance(node, ast.Name)} - variables(function)
 
 
 def _gives(function: ast.FunctionDef) -> bool:

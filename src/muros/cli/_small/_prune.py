@@ -129,8 +129,9 @@ class _Pruner(ast.NodeTransformer):
         chosen: ast.AST = self.visit(node.body if truth else node.orelse)
         return chosen
 
-    def visit_While(self, node: ast.While) -> ast.AST | None:
-        return None if self._reach.truth(node.test, self._env) is False else self.generic_visit(node)
+    def visit_While(self, node: ast.While) -> ast.AST | _Body:
+        truth = self._reach.truth(node.test, self._env)
+        return self._all(node.orelse) if truth is False else self.generic_visit(node)
 
     def visit_Try(self, node: ast.Try) -> ast.AST | _Body:
         node.body = self._all(node.body)
