@@ -78,7 +78,7 @@ def _reached(floor: Modules, messages: Modules, of_native: set[str], said: Progr
     """What the programs reach; each pass knows what the one before has left."""
     find_exports(floor, said.asked)
     readers = [*messages.values(), *said.trees]
-    foreign = said.defines() | of_native | identifiers(*messages.values())
+    foreign = said.defines() | of_native | (_FIRMWARE - {"close", "send"}) | identifiers(*messages.values())
     for _ in range(_PASSES):
         reach = Reach(floor, said.hidden | of_native | _FIRMWARE, said.hidden | of_native)
         reach.find({HOME, *said.named}, readers)

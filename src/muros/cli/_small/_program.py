@@ -31,13 +31,16 @@ class Programs:
         self.named = named_in("\n".join(self.texts))
 
     def defines(self) -> set[str]:
-        """The functions and classes that are the programs' own."""
-        return self.hidden | {
-            node.name
-            for tree in self.trees
-            for node in ast.walk(tree)
-            if isinstance(node, ast.FunctionDef | ast.ClassDef)
-        }
+        """What programs define themselves: functions, classes, and whatever they assign."""
+        found = set(self.hidden)
+        for tree in self.trees:
+            for node in ast.walk(tree):
+                match node:
+                    case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+                        found.add(name)
+                    case ast.Name(id=name, ctx=ast.Store()) | ast.Attribute(attr=name, ctx=ast.Store()):
+                        found.add(name)
+        return found
 
     def asked(self, package: str) -> set[str]:
         """The names that they take from a package; all they say when they have the package as a whole."""

@@ -40,6 +40,7 @@ class Reach(Knowledge):
         }  # mentioned within the module
         self._imported: set[tuple[str, str]] = set()
         self._loaded: set[str] = set()
+        self._handed: set[int] = set()  # functions that are given more than can be seen
         self._lent = set[str]().union(*map(_lent, modules.values()))
         self._function: ast.FunctionDef | None = None
         self._class: ast.ClassDef | None = None
@@ -62,7 +63,13 @@ class Reach(Knowledge):
     def size(self) -> int:
         """Grows with everything that is found."""
         words = sum(map(len, (self.places, self._names, self._perhaps, self._loaded, *self._own.values())))
-        return super().size() + words + len(self._imported) + sum(map(len, self._surplus.values()))
+        return (
+            super().size()
+            + len(self._handed)
+            + words
+            + len(self._imported)
+            + sum(map(len, self._surplus.values()))
+        )
 
     # What is left
 
@@ -127,6 +134,8 @@ class Reach(Knowledge):
         """Something is taken as a value: whoever has it may call it with anything."""
         for known in self.functions.get(name, ()):
             self.vary(known.node)
+            if not self.place:
+                self._handed.add(id(known.node))
         for _, node in self.classes.get(name, ()):
             for known in self._makers(node):
                 self.vary(known.node)
@@ -176,8 +185,9 @@ class Reach(Knowledge):
         for known, hidden in self._called(node.func, env):
             if not calls:
                 self.vary(known.node)
+                self._handed.add(id(known.node))
             for values, by_name in calls:
-                self._give_all(known.node, hidden, values, by_name)
+                self._give_all(known, hidden, values, by_name)
 
     def _passed_on(
         self, node: ast.Call, positional: list[Values], named: dict[str, Values]
@@ -186,7 +196,12 @@ class Reach(Knowledge):
         function = self._function
         stars = [one.value for one in node.args if isinstance(one, ast.Starred)]
         stars += [one.value for one in node.keywords if not one.arg]
-        if function is None or not node.args or len(node.args) > len(positional) + 1:
+        if (
+            function is None
+            or id(function) in self._handed
+            or not node.args
+            or len(node.args) > len(positional) + 1
+        ):
             return []
         own = {one.arg for one in (function.args.vararg, function.args.kwarg) if one}
         if not all(isinstance(one, ast.Name) and one.id in own for one in stars):
@@ -194,8 +209,9 @@ class Reach(Knowledge):
         return [(positional + more, named | others) for more, others in self._surplus.get(id(function), [])]
 
     def _give_all(
-        self, function: ast.FunctionDef, hidden: int, positional: list[Values], named: dict[str, Values]
+        self, known: Known, hidden: int, positional: list[Values], named: dict[str, Values]
     ) -> None:
+        function, here = known.node, self.place
         arguments = function.args
         parameters = [one.arg for one in arguments.args]
         defaults: dict[str, ast.expr | None] = dict.fromkeys(parameters)
@@ -215,7 +231,9 @@ class Reach(Knowledge):
                 self.give(function, name, given[name])
             else:
                 default = defaults[name]
+                self.place = known.place
                 self.give(function, name, self.values(default, {}) if default else None, explicit=False)
+                self.place = here
         for name in parameters[:hidden]:
             self.give(function, name, None)
         if arguments.vararg or arguments.kwarg:
@@ -237,11 +255,14 @@ class Reach(Knowledge):
                     self._walk_all(_as_list(node.orelse), env)
             case ast.BoolOp(op=op, values=values):
                 for one in values:
-                    truth = self.truth(one, env)
-                    if not self.is_reached(one, env) or truth is isinstance(op, ast.Or):
+                    if self.place and not self.is_reached(one, env):
                         return
-                    if truth is None:
+                    truth = self.truth(one, env) if self.place else None
+                    decides = truth is isinstance(op, ast.Or)
+                    if truth is None or decides or one is values[-1]:  # the others are left out
                         self._walk(one, env)
+                    if decides:
+                        return
             case ast.Call():
                 self._walk_call(node, env)
             case ast.Attribute(value=owner, attr=name, ctx=ast.Load()):
@@ -257,7 +278,12 @@ class Reach(Knowledge):
                 self._walk(value, env)
             case ast.AugAssign(target=target, value=value):
                 self._target(target, None, env)
+                if isinstance(target, ast.Attribute) and not self.place:
+                    self._text(target.attr)  # nobody takes it out of a program
                 self._walk(value, env)
+            case ast.Attribute(value=owner, attr=name, ctx=ast.Store() | ast.Del()):
+                self.store(name, None)
+                self._walk(owner, env)
             case ast.For(target=target):
                 self._target(target, None, env)
                 self._walk(node.iter, env)
@@ -283,7 +309,8 @@ class Reach(Knowledge):
 
     def _walk_call(self, node: ast.Call, env: Environment) -> None:
         func = node.func
-        if self.place and self.values(node, env) is not None:
+        found = self.values(node, env) if self.place else None
+        if found is not None and len(found) < 2:
             return
         self._call(node, env)
         if isinstance(func, ast.Attribute):
@@ -320,6 +347,8 @@ class Reach(Knowledge):
             self._loaded.update(words)
             for word in words:
                 self._refer(word)
+                if not self.place:
+                    self.store(word, None)  # as by setattr
 
     def _walk_function(self, node: Function, outer: Environment) -> None:
         self._walk_all([one for one in (*node.args.defaults, *node.args.kw_defaults) if one], outer)
@@ -338,6 +367,10 @@ class Reach(Knowledge):
                 self.store(one.name, None)
                 if not self.place or self.is_live(one):
                     self._walk(one, {})
+            elif isinstance(one, ast.AnnAssign):
+                if isinstance(one.target, ast.Name):
+                    self.store(one.target.id, None)
+                self._walk(one, {})
             elif isinstance(one, ast.Assign):
                 for target in one.targets:
                     if isinstance(target, ast.Name):
