@@ -190,6 +190,9 @@ def classes_are_plain(module: Module) -> Iterator[Complaint]:
             for item in node.body:
                 if isinstance(item, ast.FunctionDef) and item.name in hooks and not _lends(item):
                     yield Complaint(item.lineno, f"class {node.name} defines {item.name}")
+                text = ast.unparse(item)
+                if text.split(" = ")[0] in hooks and text != "__getattr__ = lending":
+                    yield Complaint(item.lineno, f"class {node.name} has {text}")
         if module.path == "muros/compat.py":
             continue  # where lending is done
         if (
@@ -303,6 +306,7 @@ BREACHES: dict[Rule, list[str]] = {
         "class A(B, C): pass",
         "class A(metaclass=M): pass",
         "class A:\n    def __getattr__(self, name): return 1",
+        "class A:\n    __getattr__ = guess",
         "class A:\n    def __getattribute__(self, name): return lend(self, 'muros.x', name)",
         "def f(*args): g(*args)",
         "def f(**kw): g(**kw)",

@@ -14,6 +14,7 @@ __all__ = [
     "const",
     "copy",
     "lend",
+    "lending",
     "loans",
     "names",
     "release",
@@ -48,6 +49,11 @@ def lend(owner: object, module: str, name: str) -> "Any":
     if method is None:
         raise AttributeError(f"{type(owner).__name__!r} object has no attribute {name!r}")
     return lambda *given, **named: method(owner, *given, **named)
+
+
+def lending(owner: "Any", name: str) -> "Any":
+    """``__getattr__`` of a class that has the functions of the module ``lends`` as methods."""
+    return lend(owner, owner.lends, name)
 
 
 def ticks_ms() -> int:

@@ -8,8 +8,9 @@ compared with :func:`ticks_diff` and moved with :func:`ticks_add`.
 
 A board keeps in memory what runs for each message and each turn while it is connected. The rest, what makes, connects,
 mends and closes, is *borrowed*: :func:`borrow` imports a module, :func:`release` forgets all that were borrowed and
-what they imported at their top, so that their memory is free again unless somebody holds on to them. With :func:`lend`
-an object has methods that live in a borrowed module. On hosts borrowing is importing.
+what they imported at their top, so that their memory is free again unless somebody holds on to them, as an object of
+one of their classes does. With :func:`lending` an object has methods that live in a borrowed module. On hosts borrowing
+is importing.
 """
 
 import sys
@@ -53,6 +54,10 @@ if MPY:
         """``owner``'s method ``name``: a function of a borrowed module, which takes ``owner`` first."""
         method = getattr(borrow(module), name)
         return lambda *given, **named: method(owner, *given, **named)
+
+    def lending(owner, name):  # type: ignore[no-untyped-def]
+        """``__getattr__`` of a class that has the functions of the module ``lends`` as methods."""
+        return lend(owner, owner.lends, name)
 
     def copy(target, at, source, start, n):  # type: ignore[no-untyped-def]
         """Copies ``n`` bytes; a part of the source would be allocated on the heap first."""

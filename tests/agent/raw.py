@@ -40,9 +40,9 @@ if TYPE_CHECKING:
 
 PARTICIPANT, TOPIC, PUBLISHER, SUBSCRIBER, WRITER, READER = 0x0011, 0x0012, 0x0013, 0x0014, 0x0015, 0x0016
 REQUESTER, REPLIER = 0x0017, 0x0018
-RELIABLE = Qos(reliable=True, depth=10).asked()
-KEEP_ALL = Qos(reliable=True, keep_all=True).asked()
-BEST_EFFORT = Qos(reliable=False, depth=5).asked()
+RELIABLE = Qos(reliable=True, depth=10).asked
+KEEP_ALL = Qos(reliable=True, keep_all=True).asked
+BEST_EFFORT = Qos(reliable=False, depth=5).asked
 
 
 @dataclass(frozen=True)

@@ -452,11 +452,11 @@ def test_a_service_meets_the_space() -> None:
 @pytest.mark.parametrize(
     ("qos", "words"),
     [
-        (Qos(reliable=True, depth=3).asked(), "reliable, volatile, keep last 3"),
-        (Qos(reliable=False, depth=1).asked(), "best effort, volatile, keep last 1"),
-        (Qos(keep_all=True, durability="transient_local").asked(), "reliable, transient local, keep all"),
+        (Qos(reliable=True, depth=3).asked, "reliable, volatile, keep last 3"),
+        (Qos(reliable=False, depth=1).asked, "best effort, volatile, keep last 1"),
+        (Qos(keep_all=True, durability="transient_local").asked, "reliable, transient local, keep all"),
         (
-            Qos(depth=2, deadline=100, lifespan=50).asked(),
+            Qos(depth=2, deadline=100, lifespan=50).asked,
             "reliable, volatile, keep last 2, deadline 100 ms, lifespan 50 ms",
         ),
     ],
@@ -495,7 +495,7 @@ def test_partitions_in_xml_reach_the_space(whose: str) -> None:
 
 def test_a_late_reader_gets_what_was_kept_for_it() -> None:
     bench = Bench()
-    qos = Qos(depth=3, durability="transient_local").asked()
+    qos = Qos(depth=3, durability="transient_local").asked
     writer = Raw(bench, "w", 1).base()
     writer.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER))
     for n in range(5):

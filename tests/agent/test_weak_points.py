@@ -508,7 +508,7 @@ def test_a_read_of_nothing_known_is_refused_on_the_reliable_stream() -> None:
 def test_deadline_and_lifespan_reach_the_space() -> None:
     bench = Bench()
     client = Raw(bench).base()
-    qos = Qos(reliable=True, depth=7, deadline=250, lifespan=400).asked()
+    qos = Qos(reliable=True, depth=7, deadline=250, lifespan=400).asked
     assert client.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER)) == STATUS_OK
     assert client.make(READER, create.endpoint(KIND_DATAREADER, TOPIC, qos, SUBSCRIBER)) == STATUS_OK
     for endpoint in (*bench.space.graph.writers, *bench.space.graph.readers):

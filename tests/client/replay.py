@@ -322,7 +322,7 @@ def written(variant: Variant) -> bytes:
                 Durability.PERSISTENT: "persistent",
             }[entity.qos.durability],
             not entity.qos.keep_last,
-        ).asked()
+        ).asked
         return create.endpoint(variant.kind, entity.topic_id or 0, qos, parent)
     if isinstance(entity, RequesterEntity | ReplierEntity):
         return create.service(

@@ -59,7 +59,7 @@ def test_binary(case: dict[str, Any]) -> None:
     elif kind in (3, 4):
         made = create.group(kind, parent)
     elif kind in (5, 6):
-        made = create.endpoint(kind, arguments["topic_id"] << 4 | 2, qos(arguments["qos"]).asked(), parent)
+        made = create.endpoint(kind, arguments["topic_id"] << 4 | 2, qos(arguments["qos"]).asked, parent)
     else:
         names = [
             arguments[n] for n in ("service", "request_type", "reply_type", "request_topic", "reply_topic")
@@ -85,7 +85,7 @@ def test_text(case: dict[str, Any]) -> None:
     elif kind in (3, 4):
         made = xml.group(kind, parent)
     elif kind in (5, 6):
-        made = xml.endpoint(kind, 2, Qos(kind == 5, keep_all=True).asked(), parent, chatter, string)
+        made = xml.endpoint(kind, 2, Qos(kind == 5, keep_all=True).asked, parent, chatter, string)
     else:
         add = "example_interfaces::srv::dds_::AddTwoInts_"
         made = xml.service(
@@ -106,7 +106,7 @@ def test_text(case: dict[str, Any]) -> None:
 def test_every_qos_is_read_back(
     reliable: bool, depth: int, keep_all: bool, deadline: int, lifespan: int
 ) -> None:
-    asked = Qos(reliable, depth, "transient_local", keep_all, deadline, lifespan).asked()
+    asked = Qos(reliable, depth, "transient_local", keep_all, deadline, lifespan).asked
     for kind in (5, 6):
         made = create.endpoint(kind, 0x0012, asked, 0x0013)
         entity = parse_variant_untrusted(made, 0, len(made), True).entity

@@ -67,7 +67,7 @@ def test_a_session_that_cannot_be(arguments: Any, message: str) -> None:
 def test_the_agent_reads_every_qos_from_xml(
     reliable: bool, depth: int, durability: str, keep_all: bool, deadline: int, lifespan: int
 ) -> None:
-    asked = Qos(reliable, depth, durability, keep_all, deadline, lifespan).asked()
+    asked = Qos(reliable, depth, durability, keep_all, deadline, lifespan).asked
     for kind in (5, 6):
         variant = create_text.Xml().endpoint(kind, 0x12, asked, 0x13, "rt/a", STRING)
         text = variant[8:].split(b"\0")[0].decode()

@@ -34,12 +34,17 @@ def small_compiled(tree: Mapping[str, bytes], march: str | None = None) -> Tree:
     return _floor.compiled(tree, march, _compile_small)
 
 
-def small_tree(extra: Mapping[str, bytes], programs: Iterable[str], native: bool = False) -> Tree:
-    """The board floor and more, made small for programs, as sources; with native code or without."""
+def small_tree(
+    extra: Mapping[str, bytes], programs: Iterable[str], native: bool = False, most: int | None = None
+) -> Tree:
+    """The board floor and more, made small for programs, as sources; with native code or without.
+
+    ``most`` bounds the text of joined modules.
+    """
     tree = {**board_tree(), **extra}
     if not native:
         tree = {path: content for path, content in tree.items() if not _floor.is_native(content)}
-    return small(tree, programs)[0]
+    return small(tree, programs, most)[0]
 
 
 def _compile(path: str, content: bytes, march: str | None) -> bytes:

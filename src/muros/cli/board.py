@@ -16,10 +16,12 @@ Name all types of your program at once: muros board copy build/board std_msgs/ms
 The constants of some types take more memory than their code; those are left out, unless a --program names them.
 With --mpy the files are compiled by mpy-cross: they take less memory to import, and less flash. Native code for
 serial lines is compiled for --march, as armv6m, armv7emsp, xtensawin, rv32imc or x64, and left out without.
-With --small too, names that your --program does not say become names that the firmware has anyway, and modules that
-it always needs become one: a third less heap for code. DIR/names.txt says what each name was, to read tracebacks.
+With --small the folder holds what your --program reaches and no more, under names that the firmware has anyway, in
+few modules: half the heap and half the flash. DIR/names.txt says what each name was, to read tracebacks.
 """
 _NAMES = "names.txt"
+COMPILED_THERE = 4000
+"""Characters of a joined module that a board compiles itself."""
 
 
 def register(subparsers: Any) -> None:
@@ -51,7 +53,7 @@ def register(subparsers: Any) -> None:
     copy.add_argument(
         "--small",
         action="store_true",
-        help="with --mpy and all of your --program: shorten names and join modules; much less heap",
+        help="only what all of your --program reach, with short names, in few modules; much less heap",
     )
     copy.add_argument(
         "--path",
@@ -73,11 +75,8 @@ def _copy(arguments: argparse.Namespace) -> int:
     if arguments.lean and not arguments.mpy:
         print("muros: --lean is for compiling: give --mpy too", file=sys.stderr)
         return 2
-    if arguments.small and not (arguments.mpy and arguments.program):
-        print(
-            "muros: --small is for compiling for programs: give --mpy, and --program for each file of yours",
-            file=sys.stderr,
-        )
+    if arguments.small and not arguments.program:
+        print("muros: --small is for your programs: give --program for each file of yours", file=sys.stderr)
         return 2
     try:
         for folder in arguments.path:
@@ -108,18 +107,18 @@ def _copy(arguments: argparse.Namespace) -> int:
 
 
 def _small(tree: dict[str, bytes], arguments: argparse.Namespace) -> dict[str, bytes]:
-    """The tree, small and compiled; what each name was is written beside it."""
+    """The tree, small, and compiled if it shall be; what each name was is written beside it."""
     from muros.cli import _floor
     from muros.cli._small import small
 
     if not arguments.march:
         tree = {path: content for path, content in tree.items() if not _floor.is_native(content)}
     texts = [path.read_text("utf-8", errors="replace") for path in arguments.program]
-    tree, names = small(tree, texts)
+    tree, names = small(tree, texts, None if arguments.mpy else COMPILED_THERE)
     arguments.folder.mkdir(parents=True, exist_ok=True)
     lines = [f"{new} {old}\n" for new, old in names.items()]
     (arguments.folder / _NAMES).write_text("".join(lines))
-    return _floor.compiled(tree, arguments.march, _floor.small_mpy)
+    return _floor.compiled(tree, arguments.march, _floor.small_mpy) if arguments.mpy else tree
 
 
 def add_program(parser: argparse.ArgumentParser) -> None:

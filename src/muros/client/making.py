@@ -115,7 +115,7 @@ def enter(
 
     What cannot be is complained about now, not when the agent is asked for it.
     """
-    made.qos = profile(qos).asked()
+    made.qos = profile(qos).asked
     made.type_name = type_name
     made.above = node.id >> 4
     if hasattr(made, "room"):  # a side of a service

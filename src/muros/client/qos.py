@@ -19,8 +19,9 @@ _DURABILITIES = ("volatile", "transient_local", "transient", "persistent")
 class Qos:
     """What a writer offers or a reader asks for. Times are in ms, 0 means none; depth 0 leaves it to the agent.
 
-    Raises ValueError for a durability that does not exist, and for numbers that are negative or that the wire has no
-    room for: a depth of 65536, a time of 2**32.
+    ``asked`` has flags, depth, deadline and lifespan as the agent is asked for them. Entities keep that: an object of
+    this class would keep its module in a board's memory. Raises ValueError for a durability that does not exist, and
+    for numbers that are negative or that the wire has no room for: a depth of 65536, a time of 2**32.
     """
 
     def __init__(
@@ -45,13 +46,7 @@ class Qos:
         self.depth = 0 if keep_all else depth
         self.deadline = deadline
         self.lifespan = lifespan
-
-    def asked(self) -> "Asked":
-        """Flags, depth, deadline and lifespan, as the agent is asked for them.
-
-        Entities keep these: an object of this class would keep its module in a board's memory.
-        """
-        return self.flags, self.depth, self.deadline, self.lifespan
+        self.asked: "Asked" = (self.flags, self.depth, deadline, lifespan)
 
 
 def within(name: str, value: int, last: int) -> None:

@@ -7,7 +7,7 @@ takes boards borrow: ``link`` leads the connection (the ``guide``, held until ev
 
 from struct import pack_into
 
-from muros.compat import borrow, const, lend, release, sleep_ms, ticks_add, ticks_diff, ticks_ms
+from muros.compat import borrow, const, lending, release, sleep_ms, ticks_add, ticks_diff, ticks_ms
 from muros.xrce.session import SessionCore, control, flush
 
 TYPE_CHECKING = const(0)
@@ -119,9 +119,8 @@ class Session(SessionCore):
         gone = methods.gone
         attempting = methods.attempting
     else:
-
-        def __getattr__(self, name):
-            return lend(self, "muros.client.methods", name)
+        lends = "muros.client.methods"
+        __getattr__ = lending
 
     def __init__(self, *given: "Any", **options: "Any") -> None:
         borrow("muros.client.start").start(self, *given, **options)
@@ -258,9 +257,8 @@ class Entity:
         write_bytes = entities.write_bytes
         read = entities.read
     else:
-
-        def __getattr__(self, name):
-            return lend(self, "muros.client.entities", name)
+        lends = "muros.client.entities"
+        __getattr__ = lending
 
     def publish(self, message: "Outgoing") -> bool:
         """Sends a message. False when it was not taken: the session's ``drops`` and ``on_problem`` say why.

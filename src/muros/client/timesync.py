@@ -3,7 +3,7 @@
 Time is two integers, seconds and nanoseconds: a board's numbers are too short for one.
 """
 
-from muros.compat import const, lend, ticks_diff, ticks_us
+from muros.compat import const, lending, ticks_diff, ticks_us
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -30,9 +30,8 @@ class TimeSync:
         error = exchange.error
         reply = exchange.reply
     else:
-
-        def __getattr__(self, name):
-            return lend(self, "muros.client.exchange", name)
+        lends = "muros.client.exchange"
+        __getattr__ = lending
 
     def __init__(self, session: "Session", kept: int = _KEPT, drift: int = _DRIFT) -> None:
         self.session = session

@@ -3,7 +3,7 @@
 Their methods are called when a program begins and ends: boards borrow them, from ``contexts`` and ``node``.
 """
 
-from muros.compat import borrow, const, lend
+from muros.compat import borrow, const, lending
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -37,9 +37,8 @@ class Context:
         ping = contexts.ping
         close = contexts.close
     else:
-
-        def __getattr__(self, name):
-            return lend(self, "muros.rclc.contexts", name)
+        lends = "muros.rclc.contexts"
+        __getattr__ = lending
 
     def __init__(self, way: "Any", client_key: "int | bytes | None" = None, domain_id: int = 0) -> None:
         self.begin(way, client_key, domain_id)
@@ -80,6 +79,5 @@ class Node:
         _topic = node._topic
         _resolve = node._resolve
     else:
-
-        def __getattr__(self, name):
-            return lend(self, "muros.rclc.node", name)
+        lends = "muros.rclc.node"
+        __getattr__ = lending

@@ -7,7 +7,7 @@ executors do, logical execution time and callbacks without data, is in ``let`` a
 own in the place of ``work``. Hosts have more, see ``host.executor``.
 """
 
-from muros.compat import const, lend, ticks_add, ticks_diff
+from muros.compat import const, lending, ticks_add, ticks_diff
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -62,9 +62,8 @@ class Executor:
         spin_period = periods.spin_period
         stop = handles.stop
     else:
-
-        def __getattr__(self, name):
-            return lend(self, "muros.rclc.handles", name)
+        lends = "muros.rclc.handles"
+        __getattr__ = lending
 
     def spin(self) -> None:
         """Runs until the context is closed or ``stop`` is called."""
@@ -125,9 +124,8 @@ class Handle:
         def destroy(self) -> None:
             """Takes it away, with all that waits."""
     else:
-
-        def __getattr__(self, name):
-            return lend(self, "muros.rclc.handles", name)
+        lends = "muros.rclc.handles"
+        __getattr__ = lending
 
     def __init__(self, context: "Context") -> None:
         self.context = context

@@ -7,7 +7,7 @@ The states, transitions and their numbers are those of ROS 2's managed nodes. Tr
 makes them, see ``lifecycles``. Who moves other nodes has ``lifecycle_client``.
 """
 
-from muros.compat import borrow, const, lend
+from muros.compat import borrow, const, lending
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -44,9 +44,8 @@ class Lifecycle:
         shutdown = lifecycles.shutdown
         publisher = lifecycles.publisher
     else:
-
-        def __getattr__(self, name):
-            return lend(self, "muros.rclc.lifecycles", name)
+        lends = "muros.rclc.lifecycles"
+        __getattr__ = lending
 
     def __init__(
         self,

@@ -36,11 +36,12 @@ _PASSES = 3  # what nobody reads any more is known after the first
 _FIRMWARE = OFFERED.union(STATIC, COMMON)
 
 
-def small(tree: Tree, programs: Iterable[str]) -> tuple[Tree, dict[str, str]]:
+def small(tree: Tree, programs: Iterable[str], most: int | None = None) -> tuple[Tree, dict[str, str]]:
     """The tree for these programs, given as texts, and the name that each renamed name had.
 
     ``tree`` holds sources: the board floor, and message classes, whose own names stay. Native modules stay as they are.
-    Raises SyntaxError for a source that is not Python.
+    ``most`` bounds the text of joined modules, in characters, for boards that compile them, which takes 10 to 20 bytes
+    of heap for each. Raises SyntaxError for a source that is not Python.
     """
     said = Programs(programs)
     floor: Modules = {}
@@ -60,8 +61,8 @@ def small(tree: Tree, programs: Iterable[str]) -> tuple[Tree, dict[str, str]]:
         rest[moved(name).replace(".", "/") + ".py"] = rest.pop(path)
     floor = {name: strip(node, {*native, *floor}) for name, node in floor.items()}
     floor = _reached(floor, messages, of_native, said)
-    kept = said.words | OFFERED | of_native | strings([*floor.values(), *messages.values()]) | own(messages)
-    modules = join(floor, messages, native, said)
+    kept = said.shown | OFFERED | of_native | strings([*floor.values(), *messages.values()]) | own(messages)
+    modules = join(floor, messages, native, said, most)
     inline(modules, messages, kept, said.named)
     used = identifiers(*modules.values(), *messages.values()) | kept
     share_arguments(modules.values(), kept, used)

@@ -10,26 +10,30 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Collection, Iterator
 
 from muros.cli._small._bundles import BORROWED, HOME, MOVED, OF_MESSAGES, PLAIN, RESIDENT, TO
 from muros.cli._small._exports import PACKAGES, import_exports
 from muros.cli._small._program import Programs
-from muros.cli._small._trees import Modules, defined, variables, wholes
+from muros.cli._small._trees import Modules, defined, stored, variables, wholes
 
 
-def join(modules: Modules, messages: Modules, native: Collection[str], programs: Programs) -> Modules:
+def join(
+    modules: Modules, messages: Modules, native: Collection[str], programs: Programs, most: int | None = None
+) -> Modules:
     """The modules, fewer; ``messages`` find them where they are then, and so do modules find ``native`` ones.
 
-    Modules that a program names by their path stay where they are, or hand on what they had.
+    Modules that a program names by their path stay where they are, or hand on what they had. ``most`` bounds the text
+    of a joined module, in characters.
     """
     places: dict[str, str] = {}
     named, words = programs.named, programs.words
-    residents = [*_residents(modules, messages, "\n".join(programs.texts), PLAIN if native else "")]
+    residents = [*_residents(modules, messages, "\n".join(programs.texts), PLAIN if native else "", most)]
     _gather(modules, messages, HOME, residents, words, places)
     for target, members in BORROWED.items():
         free = [name for name in members if name in modules and name not in places and name not in named]
-        _gather(modules, messages, target, free, words, places)
+        _gather(modules, messages, target, _fitting(modules, free, most), words, places)
     for name in (*modules, *native):
         if name.startswith(MOVED) and name not in places and (name not in named or name in native):
             places[name] = moved(name)
@@ -42,7 +46,9 @@ def join(modules: Modules, messages: Modules, native: Collection[str], programs:
         _Refer(modules, places, place).rewrite(tree)
         if name not in messages:
             out.setdefault(place, ast.Module([], [])).body += tree.body
-    for tree in out.values():
+    for place, tree in out.items():
+        if place != HOME:
+            _lift_imports(tree)
         tree.body = _imports_first(tree.body)
     for package in PACKAGES:
         if package in out:
@@ -62,7 +68,9 @@ def moved(name: str) -> str:
     return TO + name.removeprefix(MOVED) if name.startswith(MOVED) else name
 
 
-def _residents(modules: Modules, messages: Modules, program: str, without: str) -> Iterator[str]:
+def _residents(
+    modules: Modules, messages: Modules, program: str, without: str, most: int | None
+) -> Iterator[str]:
     """What stays in memory: all that one of these imports at its top does so, too."""
     asked = set[str]().union(*map(_needed, messages.values()))
     asked.update(*(_needed(modules[name]) for name in OF_MESSAGES if name in asked and name in modules))
@@ -70,9 +78,22 @@ def _residents(modules: Modules, messages: Modules, program: str, without: str) 
     candidates[1:1] = [name for name in OF_MESSAGES if name in asked]
     known: set[str] = set()
     for name in candidates:
-        if name in modules and name != without and _needed(modules[name]) <= known:
+        if name not in modules or name == without or not _needed(modules[name]) <= known:
+            continue
+        if len(_fitting(modules, [HOME, *known, name], most)) == len(known) + 2:
             known.add(name)
             yield name
+
+
+def _fitting(modules: Modules, names: Collection[str], most: int | None) -> list[str]:
+    """The first of these modules, as long as their text is not more than ``most``."""
+    found: list[str] = []
+    size = 0
+    for name in names:
+        size += len(ast.unparse(modules[name])) if most is not None else 0
+        if most is None or size <= most:
+            found.append(name)
+    return found
 
 
 def _needed(tree: ast.Module) -> set[str]:
@@ -288,6 +309,24 @@ class _Refer(ast.NodeTransformer):
         if isinstance(node.value, str) and node.value in self._places:
             return ast.Constant(self._places[node.value])
         return node
+
+
+def _lift_imports(tree: ast.Module) -> None:
+    """What functions import from the package, which is there anyway, their module imports at its top, once."""
+    taken = _held(tree, "")
+    for function in ast.walk(tree):
+        if not isinstance(function, ast.FunctionDef):
+            continue
+        for node in list(function.body):
+            if isinstance(node, ast.ImportFrom) and node.module == HOME:
+                shown = {one.asname or one.name: f"{HOME}.{one.name}" for one in node.names}
+                others = Counter(name for each in function.body if each is not node for name in stored(each))
+                if not any(
+                    others[name] or taken.get(name, source) != source for name, source in shown.items()
+                ):
+                    function.body.remove(node)
+                    tree.body.insert(0, node)
+                    taken.update(_held(ast.Module([node], []), ""))
 
 
 def _together(imports: list[ast.stmt]) -> list[ast.stmt]:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 
 from muros.cli._small._bundles import HOME
-from muros.cli._small._trees import WORD, identifiers
+from muros.cli._small._trees import WORD, names_of, stored
 
 
 class Programs:
@@ -18,6 +18,8 @@ class Programs:
         self.trees: list[ast.Module] = []
         self.words: set[str] = set()
         """All names, in strings too."""
+        self.shown: set[str] = set()
+        """Those of them that may be somebody else's: all but variables."""
         self.hidden: set[str] = set()
         """The words of what is written for another Python: any of them may mean anything."""
         for text in self.texts:
@@ -27,7 +29,9 @@ class Programs:
             else:
                 self.trees.append(tree)
                 self.words |= _words(tree)
+                self.shown |= _words(tree, variables=False)
         self.words |= self.hidden
+        self.shown |= self.hidden
         self.named = named_in("\n".join(self.texts))
 
     def defines(self) -> set[str]:
@@ -80,11 +84,13 @@ def _parsed(text: str) -> ast.Module | None:
     return tree
 
 
-def _words(tree: ast.Module) -> set[str]:
-    words = identifiers(tree)
+def _words(tree: ast.Module, variables: bool = True) -> set[str]:
+    words: set[str] = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             words.update(WORD.findall(node.value))
-        elif isinstance(node, ast.Global | ast.Nonlocal):
-            words.update(node.names)
+        elif isinstance(node, ast.ClassDef):
+            words.update(stored(node))
+        if variables or not isinstance(node, ast.Name):
+            words.update(names_of(node))
     return words

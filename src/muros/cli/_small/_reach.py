@@ -15,7 +15,7 @@ import ast
 from collections.abc import Collection, Iterable
 from typing import Final
 
-from muros.cli._small._trees import Function, Modules, wholes
+from muros.cli._small._trees import Function, Modules, asks, wholes
 from muros.cli._small._values import Environment, Knowledge, Known, Values, is_short
 
 _OF_CONTAINERS: Final = {"add", "remove"}
@@ -39,10 +39,13 @@ class Reach(Knowledge):
             place: set() for place in ("", *modules)
         }  # mentioned within the module
         self._imported: set[tuple[str, str]] = set()
+        self._sources: dict[tuple[str, str], set[str]] = {}  # where names of a module are imported from
+        self._aliases: dict[tuple[str, str], str] = {}  # modules by the names that others have for them
         self._loaded: set[str] = set()
         self._handed: set[int] = set()  # functions that are given more than can be seen
         self._lent = set[str]().union(*map(_lent, modules.values()))
         self._function: ast.FunctionDef | None = None
+        self._asks = False  # whether the function that is walked through asks for attributes by name
         self._class: ast.ClassDef | None = None
         self._surplus: dict[int, list[tuple[list[Values], dict[str, Values]]]] = {}
 
@@ -125,20 +128,29 @@ class Reach(Knowledge):
                 if ".".join(parts[: i + 1]) in self._modules:
                     self.places.add(".".join(parts[: i + 1]))
             self._imported.add((place, one.name))
+            self._sources.setdefault((self.place, one.asname or one.name), set()).add(place)
+            if top and whole in self._modules:
+                self._aliases[top, one.asname or one.name] = whole
             if not self.place:
                 self._names.add(one.name)
             if one.asname and one.asname != one.name:
                 self._refer(one.name)
 
-    def _refer(self, name: str) -> None:
-        """Something is taken as a value: whoever has it may call it with anything."""
+    def _refer(self, name: str, place: str | None = None) -> None:
+        """Something is taken as a value: whoever has it may call it with anything.
+
+        In ``place`` a name stands for what is defined there, or imported.
+        """
+        imported = place is None or any(one == name for _, one in self._imported)
         for known in self.functions.get(name, ()):
-            self.vary(known.node)
-            if not self.place:
-                self._handed.add(id(known.node))
-        for _, node in self.classes.get(name, ()):
-            for known in self._makers(node):
+            if place is None or (not known.owner and (imported or known.place == place)):
                 self.vary(known.node)
+                if not self.place:
+                    self._handed.add(id(known.node))
+        for source, node in self.classes.get(name, ()):
+            if imported or source == place:
+                for known in self._makers(node):
+                    self.vary(known.node)
 
     def _makers(self, node: ast.ClassDef) -> list[Known]:
         """What makes an object of a class: its own method, or one that it inherits."""
@@ -157,8 +169,17 @@ class Reach(Knowledge):
         """What a call may be of, and how many parameters it does not show."""
         match func:
             case ast.Name(id=name) if name not in env:
-                made = [(known, 1) for _, node in self.classes.get(name, ()) for known in self._makers(node)]
-                return made + [(known, 0) for known in self.functions.get(name, ()) if not known.owner]
+                made = [
+                    (known, 1)
+                    for place, node in self.classes.get(name, ())
+                    if self._is_meant(name, place)
+                    for known in self._makers(node)
+                ]
+                return made + [
+                    (known, 0)
+                    for known in self.functions.get(name, ())
+                    if not known.owner and self._is_meant(name, known.place)
+                ]
             case ast.Attribute(value=ast.Call(func=ast.Name(id="super")), attr="__init__") if self._class:
                 return [
                     (known, 1)
@@ -167,13 +188,41 @@ class Reach(Knowledge):
                     for _, node in self.classes.get(base.id, ())
                     for known in self._makers(node)
                 ]
+            case ast.Attribute(value=owner, attr=name) if module := self._module_of(owner, env):
+                made = [
+                    (known, 0)
+                    for known in self.functions.get(name, ())
+                    if known.place == module and not known.owner
+                ]
+                return made + [
+                    (known, 1)
+                    for place, node in self.classes.get(name, ())
+                    if place == module
+                    for known in self._makers(node)
+                ]
             case ast.Attribute(value=owner, attr=name):
                 made = [(known, 1) for _, node in self.classes.get(name, ()) for known in self._makers(node)]
                 for known in self.functions.get(name, ()):
-                    hidden = bool(known.owner) or (known.place in self._lent and not _is_module(owner))
+                    hidden = bool(known.owner) or known.place in self._lent
                     made.append((known, int(hidden)))
                 return made
         return []
+
+    def _is_meant(self, name: str, place: str) -> bool:
+        """Whether a name may stand for what a module defines: this one, or one that it imports from."""
+        if place == self.place:
+            return True
+        sources = self._sources.get((self.place, name), set())
+        return place in sources or any(f"{source}." in f"{place}." for source in sources)
+
+    def _module_of(self, owner: ast.expr, env: Environment) -> str:
+        """The module that an expression stands for; empty if it may be something else."""
+        match owner:
+            case ast.Call(func=ast.Name(id="borrow"), args=[ast.Constant(value=str(name))]):
+                return name
+            case ast.Name(id=name) if name not in env:
+                return self._aliases.get((self.place, name), "")
+        return ""
 
     def _call(self, node: ast.Call, env: Environment) -> None:
         """Notes what a call gives to whatever it may be of."""
@@ -291,7 +340,7 @@ class Reach(Knowledge):
             case ast.Name(id=name, ctx=ast.Load()):
                 if name not in env:
                     self._own[self.place].add(name)
-                    self._refer(name)
+                    self._refer(name, self.place)
             case ast.Constant(value=str(text)):
                 self._text(text)
             case ast.FunctionDef() | ast.Lambda():
@@ -341,6 +390,8 @@ class Reach(Knowledge):
         if text in self._modules:
             self.places.add(text)
             return
+        if self.place and not self._asks:
+            return
         words = text.replace(".", " ").replace("*", " ").split()
         if words and all(word.isidentifier() for word in words):
             self._names.update(words)
@@ -352,12 +403,13 @@ class Reach(Knowledge):
 
     def _walk_function(self, node: Function, outer: Environment) -> None:
         self._walk_all([one for one in (*node.args.defaults, *node.args.kw_defaults) if one], outer)
-        before = self._function
+        before = self._function, self._asks
         if isinstance(node, ast.FunctionDef):
             self._walk_all(node.decorator_list, outer)
             self._function = node
+            self._asks = asks(node)
         self._walk_all(_as_list(node.body), self.environment(node, outer))
-        self._function = before
+        self._function, self._asks = before
 
     def _walk_class(self, node: ast.ClassDef) -> None:
         self._walk_all(node.bases, {})
@@ -395,17 +447,15 @@ def is_pure(node: ast.expr) -> bool:
     return True
 
 
-def _is_module(owner: ast.expr) -> bool:
-    """Whether it is ``borrow("module")``."""
-    return isinstance(owner, ast.Call) and isinstance(owner.func, ast.Name) and owner.func.id == "borrow"
-
-
 def _lent(tree: ast.Module) -> set[str]:
     """The modules whose functions are methods of objects."""
     found: set[str] = set()
     for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef) and node.name == "__getattr__":
-            found |= wholes(node)
+        match node:
+            case ast.FunctionDef(name="__getattr__"):
+                found |= wholes(node)
+            case ast.Assign(targets=[ast.Name(id="lends")], value=ast.Constant(value=str(module))):
+                found.add(module)
     return found
 
 

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable
 
 from muros.cli._small._bundles import BORROWED, HOME
 from muros.cli._small._names import COMMON, STATIC
-from muros.cli._small._trees import Modules, identifiers, names_of
+from muros.cli._small._trees import Modules, asks, identifiers, names_of
 
 _SHARED = 12  # names that arguments share
 _BETWEEN = re.compile(r"[\s*.]+")  # what stands between names in a string of names
@@ -35,7 +35,10 @@ def share_arguments(trees: Collection[ast.Module], kept: Collection[str], used: 
 
 
 def shortened(modules: Modules, kept: Collection[str], used: Collection[str]) -> dict[str, str]:
-    """A free name of the firmware for each name that may have one: first for what is always in memory."""
+    """A free name of the firmware for each name that may have one: first for what is always in memory.
+
+    What many modules mention gets the names that take the least room in a compiled file.
+    """
     count = Counter(name for tree in modules.values() for name in identifiers(tree))
     always = identifiers(modules[HOME])
     often = identifiers(*(modules[name] for name in BORROWED if name in modules))
@@ -45,7 +48,8 @@ def shortened(modules: Modules, kept: Collection[str], used: Collection[str]) ->
         key=lambda name: (name not in always, name not in often, -count[name], name),
     )
     free = [name for name in (*STATIC, *COMMON) if name not in used]
-    return dict(zip(wanted, free, strict=False))
+    chosen = sorted(wanted[: len(free)], key=lambda name: (-count[name], name))
+    return dict(zip(chosen, free, strict=False))
 
 
 def _stored(tree: ast.Module) -> set[str]:
@@ -94,22 +98,11 @@ def strings(trees: Iterable[ast.Module]) -> set[str]:
     names: set[str] = set()
     for tree in trees:
         for function in ast.walk(tree):
-            if isinstance(function, ast.FunctionDef) and any(map(_asks, ast.walk(function))):
+            if isinstance(function, ast.FunctionDef) and asks(function):
                 for node in ast.walk(function):
                     if isinstance(node, ast.Constant) and isinstance(node.value, str):
                         names.update(word for word in _BETWEEN.split(node.value) if word.isidentifier())
     return names
-
-
-def _asks(node: ast.AST) -> bool:
-    return isinstance(node, ast.Name) and node.id in (
-        "getattr",
-        "hasattr",
-        "setattr",
-        "delattr",
-        "lend",
-        "__import__",
-    )
 
 
 class Renamer(ast.NodeTransformer):

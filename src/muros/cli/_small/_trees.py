@@ -76,6 +76,15 @@ def literal(value: object) -> ast.expr:
     return ast.parse(repr(value), mode="eval").body
 
 
+def asks(function: ast.FunctionDef) -> bool:
+    """Whether a function asks for attributes by names that are strings."""
+    return any(
+        isinstance(node, ast.Name)
+        and node.id in ("getattr", "hasattr", "setattr", "delattr", "lend", "__import__")
+        for node in ast.walk(function)
+    )
+
+
 def wholes(tree: ast.AST) -> set[str]:
     """The strings in code but those by which it takes one thing of a module: they may lend its functions.
 
