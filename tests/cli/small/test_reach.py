@@ -119,3 +119,11 @@ def test_a_program_in_no_syntax_of_this_python_keeps_every_word() -> None:
 def test_what_a_program_only_adds_to_is_there() -> None:
     modules = {"m": "class A:\n def __init__(self): self.missed = 5"}
     small_text(modules, "from muros.m import A\na = A()\na.missed += 1\nprint(1)")
+
+
+@pytest.mark.parametrize("change", ["setattr(a, 'limit', 7)", "a = type('B', (A,), {'limit': 7})()"])
+def test_what_a_program_stores_by_a_name_in_a_string_varies(change: str) -> None:
+    modules = {"m": "class A:\n def __init__(self): self.limit = 5\n def get(self): return self.limit"}
+    modules["m"] += "\nclass C(A):\n limit = 5\n def __init__(self): pass"
+    program = change.replace("(A,)", "(C,)")
+    small_text(modules, f"from muros.m import A, C\na = A()\n{program}\nprint(a.get())")
