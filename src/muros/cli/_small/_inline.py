@@ -201,8 +201,14 @@ class _Place:
         assert isinstance(found, ast.Call)
         given = self._arguments(found)
         uses = Counter(one.id for one in ast.walk(body[0].value) if isinstance(one, ast.Name))
+        acts = any(isinstance(one, ast.Call) for one in ast.walk(body[0].value))
         for name, value in given.items():
-            if not isinstance(value, ast.Name | ast.Constant) and (uses[name] > 1 or not _is_still(value)):
+            if isinstance(value, ast.Name | ast.Constant):
+                continue
+            read = any(isinstance(one, ast.Attribute) for one in ast.walk(value))
+            if (
+                uses[name] > 1 or not _is_still(value) or (acts and read)
+            ):  # it is worked out later than it was
                 raise _ImpossibleError
         made = _Substitute(given).visit(copy.deepcopy(body[0].value))
         _Replace(found, made).visit(node)

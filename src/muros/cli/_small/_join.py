@@ -255,6 +255,7 @@ class _Refer(ast.NodeTransformer):
             str, str
         ] = {}  # the name of what was imported by another one, and is in the same module now
         self._whole: dict[str, str] = {}  # modules by the name that they had
+        self._variables: set[str] = set()
 
     def rewrite(self, tree: ast.Module) -> None:
         """Does so all through a module."""
@@ -292,10 +293,16 @@ class _Refer(ast.NodeTransformer):
                 out.append(ast.ImportFrom(self._places[place], [one], 0))
         return _together(out) or ast.Pass()
 
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        outer, self._variables = self._variables, self._variables | variables(node)
+        self.generic_visit(node)
+        self._variables = outer
+        return node
+
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         match node.value:
             case ast.Call(func=ast.Name(id="borrow"), args=[ast.Constant(value=str(text))]):
-                if self._is_here(text):
+                if self._is_here(text) and node.attr not in self._variables:
                     return ast.Name(node.attr, ast.Load())
             case ast.Name(id=alias) if alias in self._whole:
                 return ast.Name(node.attr, ast.Load())
