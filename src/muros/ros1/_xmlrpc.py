@@ -83,7 +83,7 @@ class ApiServer:
     def __init__(self, handlers: Mapping[str, Handler]) -> None:
         self._handlers = handlers
         self._server: asyncio.Server | None = None
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._connections: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
         self.port = 0
 
     async def open(self, host: str) -> None:
@@ -95,24 +95,23 @@ class ApiServer:
         """Listens no more."""
         if self._server is not None:
             self._server.close()
-            for task in list(self._tasks):
+            await asyncio.sleep(0)  # what was accepted comes in now
+            for task in self._connections:
                 task.cancel()
-            await asyncio.gather(*self._tasks, return_exceptions=True)
+            await asyncio.gather(*self._connections, return_exceptions=True)
             await self._server.wait_closed()
             self._server = None
 
-    async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
-        assert task is not None
-        self._tasks.add(task)
-        try:
-            if len(self._tasks) <= CONNECTIONS:
+    def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """A connection has a task, and is closed with it, also where that is cancelled before it begins."""
+        task = asyncio.get_running_loop().create_task(self._attend(reader, writer))
+        self._connections[task] = writer
+        task.add_done_callback(lambda task: self._connections.pop(task).close())
+
+    async def _attend(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        if len(self._connections) <= CONNECTIONS:
+            with suppress(OSError, EOFError, TimeoutError, ApiError):
                 await self._serve(reader, writer)
-        except (OSError, EOFError, TimeoutError, ApiError, asyncio.CancelledError):
-            pass
-        finally:
-            self._tasks.discard(task)
-            writer.close()
 
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         while True:
