@@ -40,8 +40,9 @@ def join(
     had = {name: defined(modules[name]) | _imported(modules[name]) for name in residents if name in named}
     out: Modules = {}
     order = {name: i for i, name in enumerate(places)}
-    for name in sorted(modules | messages, key=lambda name: (order.get(name, -1), name)):
-        tree = (modules | messages)[name]
+    trees = modules | messages
+    for name in sorted(trees, key=lambda name: (order.get(name, -1), name)):
+        tree = trees[name]
         place = places.get(name, name)
         _Refer(modules, places, place).rewrite(tree)
         if name not in messages:

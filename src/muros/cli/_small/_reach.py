@@ -157,6 +157,9 @@ class Reach(Knowledge):
         for known in self.functions.get("__init__", ()):
             if known.node in node.body:
                 return [known]
+        return self._makers_above(node)
+
+    def _makers_above(self, node: ast.ClassDef) -> list[Known]:
         return [
             known
             for base in node.bases
@@ -181,13 +184,7 @@ class Reach(Knowledge):
                     if not known.owner and self._is_meant(name, known.place)
                 ]
             case ast.Attribute(value=ast.Call(func=ast.Name(id="super")), attr="__init__") if self._class:
-                return [
-                    (known, 1)
-                    for base in self._class.bases
-                    if isinstance(base, ast.Name)
-                    for _, node in self.classes.get(base.id, ())
-                    for known in self._makers(node)
-                ]
+                return [(known, 1) for known in self._makers_above(self._class)]
             case ast.Attribute(value=owner, attr=name) if module := self._module_of(owner, env):
                 made = [
                     (known, 0)

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable
 
 from muros.cli._small._bundles import BORROWED, HOME
 from muros.cli._small._names import COMMON, STATIC
-from muros.cli._small._trees import Modules, asks, identifiers, names_of
+from muros.cli._small._trees import Modules, asks, assigned, identifiers, names_of
 
 _SHARED = 12  # names that arguments share
 _BETWEEN = re.compile(r"[\s*.]+")  # what stands between names in a string of names
@@ -66,15 +66,8 @@ def _stored(tree: ast.Module) -> set[str]:
 
 def _assigned(tree: ast.Module) -> set[str]:
     """The names that a module and its classes assign."""
-    return {
-        target.id
-        for scope in ast.walk(tree)
-        if isinstance(scope, ast.Module | ast.ClassDef)
-        for node in scope.body
-        if isinstance(node, ast.Assign)
-        for target in node.targets
-        if isinstance(target, ast.Name)
-    }
+    scopes = (node for node in ast.walk(tree) if isinstance(node, ast.Module | ast.ClassDef))
+    return set[str]().union(*map(assigned, scopes))
 
 
 def own(messages: Modules) -> set[str]:

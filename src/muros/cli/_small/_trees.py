@@ -14,15 +14,21 @@ Modules = dict[str, ast.Module]
 Function = ast.FunctionDef | ast.Lambda
 
 
+def assigned(scope: ast.Module | ast.ClassDef) -> set[str]:
+    """The names that a module or a class assigns."""
+    return {
+        target.id
+        for node in scope.body
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Name)
+    }
+
+
 def defined(tree: ast.Module) -> set[str]:
     """What a module defines at its top, without what it imports."""
-    names: set[str] = set()
-    for node in tree.body:
-        if isinstance(node, ast.FunctionDef | ast.ClassDef):
-            names.add(node.name)
-        elif isinstance(node, ast.Assign):
-            names.update(target.id for target in node.targets if isinstance(target, ast.Name))
-    return names
+    made = {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    return made | assigned(tree)
 
 
 def stored(node: ast.AST) -> Iterator[str]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, Final
 
-from muros.cli._small._trees import Function, Modules, is_plain, stored, variables
+from muros.cli._small._trees import Function, Modules, assigned, is_plain, stored, variables
 
 Values = tuple[Any, ...] | None
 """The constants that something may be, none while nothing is known; None for anything at all."""
@@ -246,10 +246,8 @@ def _ever_stored(tree: ast.Module) -> Iterator[str]:
         match node:
             case ast.Attribute(attr=name, ctx=ast.Store() | ast.Del()):
                 yield name
-            case ast.ClassDef(body=body):
-                for one in body:
-                    if isinstance(one, ast.Assign):
-                        yield from (target.id for target in one.targets if isinstance(target, ast.Name))
+            case ast.ClassDef():
+                yield from assigned(node)
 
 
 def _constants(tree: ast.Module) -> Iterator[tuple[str, object]]:
