@@ -174,14 +174,19 @@ except RtcError as error:
 """
 
 
-def test_an_orb_is_ended_by_what_it_serves_and_started_again() -> None:
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", _PROGRAM],
+def run(program: str) -> subprocess.CompletedProcess[str]:
+    """A program in a process of its own, for which warnings are errors."""
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", program],
         capture_output=True,
         text=True,
         timeout=30,
         check=False,
     )
+
+
+def test_an_orb_is_ended_by_what_it_serves_and_started_again() -> None:
+    done = run(_PROGRAM)
     assert done.returncode == 0, done.stderr
     first, second = done.stdout.splitlines()
     assert first == "the ORB does not start w"
@@ -213,13 +218,7 @@ print("ended")
 
 def test_an_orb_that_others_have_destroyed_is_ended() -> None:
     """Tools that run components in the process of their own ORB (rtlog, rtinject) end it before the manager does."""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", _SHARED],
-        capture_output=True,
-        text=True,
-        timeout=30,
-        check=False,
-    )
+    done = run(_SHARED)
     assert (done.returncode, done.stdout, done.stderr) == (0, "ended\n", "")
 
 

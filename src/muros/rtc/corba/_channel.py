@@ -8,9 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from omniORB import CORBA
-
-from muros.rtc.codes import PortStatus
 from muros.rtc.corba._orb import Orb
 from muros.rtc.corba._stubs import CSP, CSP__POA, RTC
 from muros.rtc.corba._transports import CorbaInlet, CorbaOffer, CorbaOutlet, reference_in
@@ -78,12 +75,7 @@ class _Inlet(CorbaInlet):
 
     def is_writable(self, retry: bool) -> bool:
         """Ask the InPort's object."""
-        try:
-            answer = bool(self._is_writable(retry))
-        except CORBA.Exception as error:
-            return self._failed(error) is PortStatus.PORT_OK
-        self._late = 0
-        return answer
+        return self.agrees(self._is_writable, retry)
 
 
 class _Outlet(CorbaOutlet):
@@ -93,9 +85,4 @@ class _Outlet(CorbaOutlet):
 
     def is_readable(self, retry: bool) -> bool:
         """Ask the OutPort's object."""
-        try:
-            answer = bool(self._is_readable(retry))
-        except CORBA.Exception as error:
-            return self._failed(error) is PortStatus.PORT_OK
-        self._late = 0
-        return answer
+        return self.agrees(self._is_readable, retry)

@@ -150,6 +150,16 @@ class _Caller:
     def close(self) -> None:
         """Nothing is held but the reference."""
 
+    def agrees(self, operation: Callable[[bool], Any], retry: bool) -> bool:
+        """What an operation of the peer's object says; False for one that could not be called."""
+        try:
+            answer = bool(operation(retry))
+        except CORBA.Exception as error:
+            self._failed(error)
+            return False
+        self._late = 0
+        return answer
+
     def _failed(self, error: CORBA.Exception) -> PortStatus:
         text = describe(error)
         if isinstance(error, LOST):
