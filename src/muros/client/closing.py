@@ -52,7 +52,7 @@ def close(session: "Session", left: int = _TIMEOUT) -> None:
     session.send = closed.send
     session.up = False
     session.login = True
-    if session.state:
+    if session.state:  # as ``link.enter``, which would take a board the memory of all of ``link``
         session.state = _WAITING
         if session.on_state is not None:
             session.on_state(_WAITING)
