@@ -30,7 +30,7 @@ class Context:
         running: bool
         clock: "Callable[[], int]"  # what timers and executors go by
 
-        begin = contexts.begin
+        begin_with = contexts.begin_with
         node = contexts.node
         on_state = contexts.on_state
         on_problem = contexts.on_problem
@@ -41,7 +41,7 @@ class Context:
         __getattr__ = lending
 
     def __init__(self, way: "Any", client_key: "int | bytes | None" = None, domain_id: int = 0) -> None:
-        self.begin(way, client_key, domain_id)
+        self.begin_with(way, client_key, domain_id)
 
     @property
     def state(self) -> str:
@@ -64,7 +64,7 @@ class Node:
         entities: "list[Entity]"
         participant: "Any"
 
-        begin = node.begin
+        begin_in = node.begin_in
         publisher = node.publisher
         subscription = node.subscription
         timer = node.timer

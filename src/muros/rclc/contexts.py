@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 STATES = ("WAITING", "CONNECTING", "CONNECTED", "LOST")
 
 
-def begin(self: "Context", way: "Any", client_key: "int | bytes | None", domain_id: int) -> None:
+def begin_with(self: "Context", way: "Any", client_key: "int | bytes | None", domain_id: int) -> None:
     """Sets up a context; arguments as for ``Context``."""
     if not hasattr(way, "spin_once"):
         from muros.client.session import Session
@@ -30,7 +30,7 @@ def node(self: "Context", name: str, namespace: str = "") -> "Node":
     from muros.rclc.context import Node
 
     made = Node()
-    made.begin(self, name, namespace)
+    made.begin_in(self, name, namespace)
     return made
 
 

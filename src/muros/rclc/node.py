@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from muros.rclc.timer import Timer
 
 
-def begin(self: "Node", context: "Context", name: str, namespace: str) -> None:
+def begin_in(self: "Node", context: "Context", name: str, namespace: str) -> None:
     """Sets up a node."""
     _check(name)
     full = name

@@ -25,7 +25,7 @@ from muros.cli._small._inline import inline
 from muros.cli._small._join import join, moved
 from muros.cli._small._names import COMMON, OFFERED, STATIC
 from muros.cli._small._program import Programs
-from muros.cli._small._prune import prune
+from muros.cli._small._prune import prune, unlend
 from muros.cli._small._reach import Reach
 from muros.cli._small._rename import Renamer, own, share_arguments, shortened, strings
 from muros.cli._small._strip import strip
@@ -84,4 +84,5 @@ def _reached(floor: Modules, messages: Modules, of_native: set[str], said: Progr
         reach = Reach(floor, said.hidden | of_native | _FIRMWARE, said.hidden | of_native)
         reach.find({HOME, *said.named}, readers)
         floor = prune(floor, reach, foreign)
+        unlend(floor)
     return floor

@@ -26,6 +26,8 @@ RESIDENT: tuple[tuple[str, str], ...] = (
     ("muros.rclc.service", _CALLED % "service"),
     ("muros.rclc.client", _CALLED % "client"),
     ("muros.client.timesync", r"\bTimeSync\b"),
+    ("muros.client.exchange", r"\bTimeSync\b"),
+    ("muros.client.echo", _CALLED % "ping"),
 )
 """Modules in the order of their need, and what a program says that keeps the module while it is connected."""
 
@@ -57,5 +59,11 @@ BORROWED: dict[str, tuple[str, ...]] = {
         "muros.client.creating",
         "muros.client.link",
     ),
+    "muros.trouble": (
+        "muros.xrce.mending",
+        "muros.xrce.fragments",
+        "muros.client.backlog",
+    ),
 }
-"""Modules that are borrowed together: to begin a session, to make things in it, to connect; and what these share."""
+"""Modules that are borrowed together: to begin a session; to make things in it; to connect; what both need; and for messages
+that got lost, are longer than one datagram, or have to wait."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 
 from muros.cli._small._trees import Modules
 
@@ -40,6 +40,15 @@ def import_exports(package: ast.Module, names: Collection[str], source: str) -> 
     if found:
         body.insert(0, ast.ImportFrom(source, [ast.alias(name) for name in found], 0))
     package.body = body
+
+
+def imported(packages: Iterable[ast.Module]) -> Iterator[str]:
+    """The modules that packages import for what a board keeps of them."""
+    for tree in packages:
+        for node in ast.walk(tree):
+            match node:
+                case ast.Call(func=ast.Name(id="__import__"), args=[ast.Constant(value=str(place)), *_]):
+                    yield place
 
 
 def _looks_for(node: ast.stmt) -> str:

@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator
 
 from muros.cli._small._bundles import BORROWED, HOME, MOVED, OF_MESSAGES, PLAIN, RESIDENT, TO
-from muros.cli._small._exports import PACKAGES, import_exports
+from muros.cli._small._exports import PACKAGES, import_exports, imported
 from muros.cli._small._program import Programs
 from muros.cli._small._trees import Modules, defined, stored, variables, wholes
 
@@ -31,8 +31,9 @@ def join(
     named, words = programs.named, programs.words
     residents = [*_residents(modules, messages, "\n".join(programs.texts), PLAIN if native else "", most)]
     _gather(modules, messages, HOME, residents, words, places)
+    kept = {*named, *imported(modules[package] for package in PACKAGES if package in modules)}
     for target, members in BORROWED.items():
-        free = [name for name in members if name in modules and name not in places and name not in named]
+        free = [name for name in members if name in modules and name not in places and name not in kept]
         _gather(modules, messages, target, _fitting(modules, free, most), words, places)
     for name in (*modules, *native):
         if name.startswith(MOVED) and name not in places and (name not in named or name in native):

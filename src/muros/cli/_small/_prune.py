@@ -6,8 +6,9 @@ import ast
 from collections import Counter
 from collections.abc import Collection
 
+from muros.cli._small._bundles import HOME
 from muros.cli._small._reach import Reach, is_pure
-from muros.cli._small._trees import Function, Modules, is_plain, literal, stored, variables
+from muros.cli._small._trees import Function, Modules, is_plain, literal, stored, variables, wholes
 from muros.cli._small._values import Environment, is_short
 
 _Body = list[ast.stmt]
@@ -23,6 +24,39 @@ def prune(modules: Modules, reach: Reach, foreign: Collection[str]) -> Modules:
     return {
         place: _pruned(tree, place, reach, idle) for place, tree in modules.items() if place in reach.places
     }
+
+
+def unlend(modules: Modules) -> None:
+    """Classes and modules no longer look for their functions in modules that have none left."""
+    for tree in modules.values():
+        for scope in (tree, *(node for node in tree.body if isinstance(node, ast.ClassDef))):
+            looked = {place for node in scope.body for place in _lenders(node)}
+            if looked and not any(_gives(modules, place) for place in looked):
+                scope.body = [one for one in scope.body if not _lenders(one) and not _looks(one)]
+                scope.body = scope.body or [ast.Pass()]
+
+
+def _lenders(node: ast.stmt) -> set[str]:
+    """The modules in which a statement has functions looked for."""
+    match node:
+        case ast.Assign(targets=[ast.Name(id="lends")]) | ast.FunctionDef(name="__getattr__"):
+            return {place for place in wholes(node) if place.startswith(f"{HOME}.")}
+    return set()
+
+
+def _looks(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__getattr__"
+
+
+def _gives(modules: Modules, place: str) -> bool:
+    """Whether a module has anything for whoever looks in it, or looks where there is something."""
+    for node in modules[place].body if place in modules else []:
+        looked = _lenders(node)
+        if looked and any(_gives(modules, other) for other in looked):
+            return True
+        if not looked and not isinstance(node, ast.Import | ast.ImportFrom | ast.Pass):
+            return True
+    return False
 
 
 def _pruned(tree: ast.Module, place: str, reach: Reach, idle: Collection[str]) -> ast.Module:

@@ -179,7 +179,7 @@ class Node(context_.Node):
         self.rules = (*remapping.rules_of(remap), *arguments.rules)
         name, namespace = remapping.remap_node(name, namespace, self.rules)
         try:
-            node_.begin(self, context, name, namespace)
+            node_.begin_in(self, context, name, namespace)
         except InvalidNameError as error:
             if is_token(name):
                 error.code = NODE_INVALID_NAMESPACE
