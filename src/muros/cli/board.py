@@ -116,7 +116,7 @@ def _small(tree: dict[str, bytes], arguments: argparse.Namespace) -> dict[str, b
     texts = [path.read_text("utf-8", errors="replace") for path in arguments.program]
     tree, names = small(tree, texts, None if arguments.mpy else COMPILED_THERE)
     arguments.folder.mkdir(parents=True, exist_ok=True)
-    lines = [f"{new} {old}\n" for new, old in names.items()]
+    lines = sorted(f"{new} {old}\n" for old, new in names.items())
     (arguments.folder / _NAMES).write_text("".join(lines))
     return _floor.compiled(tree, arguments.march, _floor.small_mpy) if arguments.mpy else tree
 

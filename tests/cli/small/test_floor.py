@@ -78,11 +78,10 @@ def test_modules_compile_with_mpy_cross() -> None:
     assert len(small_compiled(tree)) == len(tree)
 
 
-def test_names_are_told_once() -> None:
+def test_what_is_renamed_is_told() -> None:
     tree, names = publisher()
-    assert len(set(names.values())) == len(names)
-    assert "SessionCore" in names.values()
-    assert not set(names.values()) & {"publisher", "Context", "message", "data", "std_msgs", "tell"}
+    assert "SessionCore" in names
+    assert not set(names) & {"publisher", "Context", "message", "data", "std_msgs", "tell"}
     before = sum(map(len, sources().values()))
     assert sum(map(len, tree.values())) < before / 4
 

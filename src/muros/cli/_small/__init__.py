@@ -27,17 +27,20 @@ from muros.cli._small._names import COMMON, OFFERED, STATIC
 from muros.cli._small._program import Programs
 from muros.cli._small._prune import prune, unlend
 from muros.cli._small._reach import Reach
-from muros.cli._small._rename import Renamer, own, share_arguments, shortened, strings
+from muros.cli._small._rename import Renamer, own, shortened, strings
+from muros.cli._small._share import share
 from muros.cli._small._strip import strip
+from muros.cli._small._tidy import tidy
 from muros.cli._small._trees import Modules, defined, identifiers
 
 _PACKAGE = "/__init__.py"
 _PASSES = 3  # what nobody reads any more is known after the first
+_ROUNDS = 2  # what is shorter then may be put in its place
 _FIRMWARE = OFFERED.union(STATIC, COMMON)
 
 
 def small(tree: Tree, programs: Iterable[str], most: int | None = None) -> tuple[Tree, dict[str, str]]:
-    """The tree for these programs, given as texts, and the name that each renamed name had.
+    """The tree for these programs, given as texts, and the new name of each that is renamed.
 
     ``tree`` holds sources: the board floor, and message classes, whose own names stay. Native modules stay as they are.
     ``most`` bounds the text of joined modules, in characters, for boards that compile them, which takes 10 to 20 bytes
@@ -61,18 +64,22 @@ def small(tree: Tree, programs: Iterable[str], most: int | None = None) -> tuple
         rest[moved(name).replace(".", "/") + ".py"] = rest.pop(path)
     floor = {name: strip(node, {*native, *floor}) for name, node in floor.items()}
     floor = _reached(floor, messages, of_native, said)
-    kept = said.shown | OFFERED | of_native | strings([*floor.values(), *messages.values()]) | own(messages)
+    asked = strings([*floor.values(), *messages.values()])
+    kept = said.shown | OFFERED | of_native | asked | own(messages)
     modules = join(floor, messages, native, said, most)
-    inline(modules, messages, kept, said.named)
+    for _ in range(_ROUNDS):
+        inline(modules, messages, kept, said.named)
+        tidy(modules)
+    pairs = share(modules, messages, kept, asked)
     used = identifiers(*modules.values(), *messages.values()) | kept
-    share_arguments(modules.values(), kept, used)
-    names = shortened(modules, kept, used | identifiers(*modules.values()))
+    names = shortened(modules, kept | set(pairs), used)
+    names |= {name: names.get(other, other) for name, other in pairs.items()}
     out = dict(rest)
     for name, node in (modules | messages).items():
         ast.fix_missing_locations(Renamer(names, {*modules, *native}).visit(node))
         path = name.replace(".", "/") + (_PACKAGE if name in packages else ".py")
         out[path] = ast.unparse(node).encode()
-    return out, {new: old for old, new in sorted(names.items())}
+    return out, dict(sorted(names.items()))
 
 
 def _reached(floor: Modules, messages: Modules, of_native: set[str], said: Programs) -> Modules:

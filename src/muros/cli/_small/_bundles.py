@@ -65,5 +65,5 @@ BORROWED: dict[str, tuple[str, ...]] = {
         "muros.client.backlog",
     ),
 }
-"""Modules that are borrowed together: to begin a session; to make things in it; to connect; what both need; and for messages
-that got lost, are longer than one datagram, or have to wait."""
+"""Modules that are borrowed together: to begin a session; to make things in it; to connect; what all of these need;
+and for messages that got lost, are longer than one datagram, or have to wait."""

@@ -16,7 +16,7 @@ from muros.cli._small._bundles import HOME
 from muros.cli._small._frames import MOST
 from muros.cli._small._frames import words as frame
 from muros.cli._small._names import COMMON, STATIC
-from muros.cli._small._trees import WORD, Modules, names_of, stored, variables, wholes
+from muros.cli._small._trees import WORD, Modules, Substitute, names_of, stored, variables, wholes
 
 _FIRMWARE = frozenset([*STATIC, *COMMON])  # a method's name may be that of a list's
 _Body = list[ast.stmt]
@@ -210,7 +210,7 @@ class _Place:
                 uses[name] > 1 or not _is_still(value) or (acts and read)
             ):  # it is worked out later than it was
                 raise _ImpossibleError
-        made = _Substitute(given).visit(copy.deepcopy(body[0].value))
+        made = Substitute(given).visit(copy.deepcopy(body[0].value))
         _Replace(found, made).visit(node)
         self.done = True
         return node
@@ -262,7 +262,7 @@ class _Place:
             for one in before:
                 if fresh & {n.id for n in ast.walk(one.value) if isinstance(n, ast.Name)}:  # type: ignore[attr-defined]
                     raise _ImpossibleError
-        body = [_Substitute(names).visit(node) for node in body]
+        body = [Substitute(names).visit(node) for node in body]
         if make is None:
             if not last and not _ends(body):
                 body.append(ast.Return(None))
@@ -351,33 +351,6 @@ def _local_names(function: ast.FunctionDef) -> Iterator[str]:
             yield one.arg
         elif isinstance(one, ast.Name):
             yield one.id
-
-
-class _Substitute(ast.NodeTransformer):
-    def __init__(self, names: dict[str, ast.expr]) -> None:
-        self._names = names
-
-    def visit_Name(self, node: ast.Name) -> ast.AST:
-        value = self._names.get(node.id)
-        if value is None:
-            return node
-        if isinstance(node.ctx, ast.Load):
-            return copy.deepcopy(value)
-        assert isinstance(value, ast.Name)
-        return ast.Name(value.id, node.ctx)
-
-    def visit_ExceptHandler(self, node: ast.ExceptHandler) -> ast.AST:
-        value = self._names.get(node.name or "")
-        if isinstance(value, ast.Name):
-            node.name = value.id
-        return self.generic_visit(node)
-
-    def visit_alias(self, node: ast.alias) -> ast.AST:
-        shown = node.asname or node.name.split(".")[0]
-        value = self._names.get(shown)
-        if isinstance(value, ast.Name) and value.id != shown:
-            node.asname = value.id
-        return node
 
 
 class _Replace(ast.NodeTransformer):

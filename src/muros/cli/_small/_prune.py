@@ -8,7 +8,16 @@ from collections.abc import Collection
 
 from muros.cli._small._bundles import HOME
 from muros.cli._small._reach import Reach, is_pure
-from muros.cli._small._trees import Function, Modules, is_plain, literal, stored, variables, wholes
+from muros.cli._small._trees import (
+    Function,
+    Modules,
+    Substitute,
+    is_plain,
+    literal,
+    stored,
+    variables,
+    wholes,
+)
 from muros.cli._small._values import Environment, is_short
 
 _Body = list[ast.stmt]
@@ -101,7 +110,7 @@ class _Pruner(ast.NodeTransformer):
         self._env = outer
 
     def _shorten(self, node: ast.FunctionDef) -> None:
-        """Takes out parameters that no call gives and whose value stands in the body."""
+        """Takes out parameters that no call gives and whose value stands in the body, and defaults not needed."""
 
         used = {one.id for each in node.body for one in ast.walk(each) if isinstance(one, ast.Name)}
 
@@ -117,6 +126,10 @@ class _Pruner(ast.NodeTransformer):
                 del arguments.kwonlyargs[i], arguments.kw_defaults[i]
         while arguments.defaults and is_decided(arguments.args[-1]):
             del arguments.args[-1], arguments.defaults[-1]
+        while arguments.defaults and not self._reach.is_left_out(
+            node, arguments.args[-len(arguments.defaults)].arg
+        ):
+            del arguments.defaults[0]
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         self._in(node)
@@ -283,18 +296,22 @@ def _returned_at_once(body: _Body) -> _Body:
 
 
 def _without_copies(function: ast.FunctionDef) -> _Body:
-    """A function's body without variables that are only another name for something of the module."""
+    """A function's body without variables that are only another name for something of the module, or a constant's."""
     own = variables(function)
     names = Counter(stored(function))
-    copies = {}
+    arguments = {one.arg for one in ast.walk(function) if isinstance(one, ast.arg)}
+    copies: dict[str, ast.expr] = {}
+    body: _Body = []
     for node in function.body:
         match node:
-            case ast.Assign(targets=[ast.Name(id=new)], value=ast.Name(id=old)):
-                if names[new] == 1 and old not in own:
-                    copies[new] = node, old
-    for new, (node, old) in copies.items():
-        function.body.remove(node)
-        for one in ast.walk(function):
-            if isinstance(one, ast.Name) and one.id == new:
-                one.id = old
-    return function.body
+            case ast.Assign(targets=[ast.Name(id=new)], value=value) if (
+                names[new] == 1 and new not in arguments
+            ):
+                if isinstance(value, ast.Name) and value.id not in own:
+                    copies[new] = value
+                    continue
+                if isinstance(value, ast.Constant) and is_short(value.value):
+                    copies[new] = value
+                    continue
+        body.append(node)
+    return [Substitute(copies).visit(node) for node in body]

@@ -11,31 +11,11 @@ from muros.cli._small._bundles import BORROWED, HOME
 from muros.cli._small._names import COMMON, STATIC
 from muros.cli._small._trees import Modules, asks, assigned, identifiers, names_of
 
-_SHARED = 12  # names that arguments share
 _BETWEEN = re.compile(r"[\s*.]+")  # what stands between names in a string of names
 
 
-def share_arguments(trees: Collection[ast.Module], kept: Collection[str], used: Collection[str]) -> None:
-    """Gives arguments that only their own function knows the same few names, not ``used`` yet, in all functions."""
-    shared = [name for name in STATIC if name not in used][:_SHARED]
-    public = set(kept)
-    for tree in trees:
-        public |= _assigned(tree)
-        for node in ast.walk(tree):
-            if not isinstance(node, ast.arg | ast.Name):
-                public.update(names_of(node))
-    for tree in trees:
-        classes = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]
-        bodies = [tree.body, *(node.body for node in classes)]
-        for function in (node for body in bodies for node in body):
-            if isinstance(function, ast.FunctionDef):
-                given = [node.arg for node in ast.walk(function) if isinstance(node, ast.arg)]
-                own = [name for name in dict.fromkeys(given) if name not in public]
-                Renamer(dict(zip(own, shared, strict=False)), ()).visit(function)
-
-
 def shortened(modules: Modules, kept: Collection[str], used: Collection[str]) -> dict[str, str]:
-    """A free name of the firmware for each name that may have one: first for what is always in memory.
+    """A free name of the firmware for each name but ``kept`` ones: first for what is always in memory.
 
     What many modules mention gets the names that take the least room in a compiled file.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import copy
 import re
 from collections.abc import Iterator
 
@@ -106,3 +107,32 @@ def wholes(tree: ast.AST) -> set[str]:
         for node in ast.walk(tree)
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in direct
     }
+
+
+class Substitute(ast.NodeTransformer):
+    """Puts expressions where variables are read, and other names where they are given values."""
+
+    def __init__(self, names: dict[str, ast.expr]) -> None:
+        self._names = names
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        value = self._names.get(node.id)
+        if value is None:
+            return node
+        if isinstance(node.ctx, ast.Load):
+            return copy.deepcopy(value)
+        assert isinstance(value, ast.Name)
+        return ast.Name(value.id, node.ctx)
+
+    def visit_ExceptHandler(self, node: ast.ExceptHandler) -> ast.AST:
+        value = self._names.get(node.name or "")
+        if isinstance(value, ast.Name):
+            node.name = value.id
+        return self.generic_visit(node)
+
+    def visit_alias(self, node: ast.alias) -> ast.AST:
+        shown = node.asname or node.name.split(".")[0]
+        value = self._names.get(shown)
+        if isinstance(value, ast.Name) and value.id != shown:
+            node.asname = value.id
+        return node

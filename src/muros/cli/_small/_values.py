@@ -58,6 +58,7 @@ class Knowledge:
         self._attributes: dict[str, list[object]] = {}
         self._given: dict[tuple[int, str], list[object]] = {}
         self._explicit: set[tuple[int, str]] = set()
+        self._left_out: set[tuple[int, str]] = set()
         self._varied: set[int] = set()
         self._gave_up: set[str] = set()
         self._asked: set[str] = set()
@@ -77,7 +78,7 @@ class Knowledge:
     def size(self) -> int:
         """Grows with everything that is learnt."""
         found = sum(map(len, self._attributes.values())) + sum(map(len, self._given.values()))
-        return found + len(self._explicit) + len(self._varied) + len(self._gave_up)
+        return found + len(self._explicit) + len(self._left_out) + len(self._varied) + len(self._gave_up)
 
     def store(self, name: str, values: Values) -> None:
         """An attribute may have one of these values."""
@@ -86,8 +87,7 @@ class Knowledge:
     def give(self, function: ast.FunctionDef, parameter: str, values: Values, explicit: bool = True) -> None:
         """A parameter may have one of these values, which a call names or leaves to the default."""
         _add(self._given.setdefault((id(function), parameter), []), values)
-        if explicit:
-            self._explicit.add((id(function), parameter))
+        (self._explicit if explicit else self._left_out).add((id(function), parameter))
 
     def vary(self, function: ast.FunctionDef) -> None:
         """It may be called with anything."""
@@ -108,6 +108,10 @@ class Knowledge:
     def is_explicit(self, function: ast.FunctionDef, parameter: str) -> bool:
         """Whether a call gives a value for a parameter."""
         return id(function) in self._varied or (id(function), parameter) in self._explicit
+
+    def is_left_out(self, function: ast.FunctionDef, parameter: str) -> bool:
+        """Whether a call leaves a parameter to its default."""
+        return id(function) in self._varied or (id(function), parameter) in self._left_out
 
     def attribute(self, name: str) -> Values:
         """What an attribute of this name may be."""
@@ -151,10 +155,10 @@ class Knowledge:
                 return _both(_compare(op), self.values(left, env), self.values(right, env))
             case ast.BoolOp():
                 return self._either(node, env)
-            case ast.Call(func=ast.Name(id="hasattr"), args=[_, ast.Constant(value=str(name))]):
-                return None if self.may_have(name) else (False,)
-            case ast.Call(func=ast.Name(id="getattr"), args=[_, ast.Constant(value=str(name)), default]):
-                return None if self.may_have(name) else self.values(default, env)
+            case ast.Call(func=ast.Name(id="hasattr"), args=[owner, ast.Constant(value=str(name))]):
+                return (False,) if self._lacks(owner, name, env) else None
+            case ast.Call(func=ast.Name(id="getattr"), args=[owner, ast.Constant(value=str(name)), default]):
+                return self.values(default, env) if self._lacks(owner, name, env) else None
             case ast.Call(func=ast.Name(id="isinstance"), args=[one, ast.Name(id=kind)]) if kind in _TYPES:
                 found = self.values(one, env)
                 return (
@@ -171,6 +175,13 @@ class Knowledge:
     def is_reached(self, test: ast.expr, env: Environment) -> bool:
         """Whether there is a value to decide by."""
         return self.values(test, env) != ()
+
+    def _lacks(self, owner: ast.expr, name: str, env: Environment) -> bool:
+        """Whether something has no attribute of that name."""
+        found = self.values(owner, env)
+        if found and all(isinstance(one, str | int) for one in found):
+            return not any(hasattr(one, name) for one in found)
+        return not self.may_have(name)
 
     def _constant(self, name: str) -> Values:
         found = self._constants.get(self.place, {})

@@ -1,0 +1,168 @@
+"""Names that stand for more than one thing: in a compiled file a name takes two bytes more than its length, once.
+
+Variables of a module and attributes of objects are looked up apart. So a function of a module may be named as some
+attribute that the module mentions anyway, and so may arguments. Variables of functions have no names in a compiled
+file; where a board compiles, few names serve for those of all functions.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field
+
+from muros.cli._small._names import COMMON
+from muros.cli._small._trees import Modules, assigned, defined, names_of, stored
+
+_ARGUMENTS = 12  # names that arguments share
+_Places = defaultdict[str, set[str]]
+
+
+def share(
+    modules: Modules, messages: Modules, kept: Collection[str], asked: Collection[str]
+) -> dict[str, str]:
+    """Gives arguments and variables of functions shared names, and tells which names things of modules may share.
+
+    That is, for each of these the name of an attribute; whoever renames the attribute gives both the new name. ``kept``
+    names stay, and nothing gets one of those by which attributes are ``asked`` for.
+    """
+    arguments = _share_variables(modules, kept, {*kept, *_all_names(modules | messages)})
+    found = _Mentions.of(modules | messages)
+    free = {
+        name: places
+        for name, places in found.attributes.items()
+        if name not in found.variables and name not in asked and not name.startswith("__")
+    }
+    for place in modules:
+        for part in place.split("."):
+            free.pop(part, None)  # a package has its modules as attributes
+    wide = sorted(free, key=lambda name: (-len(free[name]), name))
+    shared = dict(zip(arguments, wide, strict=False))
+    for tree in modules.values():
+        _Variables(shared).visit(tree)
+    for name in shared.values():
+        del free[name]
+    return dict(_pairs(modules, found, kept, free))
+
+
+@dataclass
+class _Mentions:
+    """Where names stand for attributes, and where for variables or for what calls name."""
+
+    attributes: _Places = field(default_factory=lambda: defaultdict(set))
+    variables: _Places = field(default_factory=lambda: defaultdict(set))
+
+    @classmethod
+    def of(cls, trees: Modules) -> _Mentions:
+        found = cls()
+        for place, tree in trees.items():
+            methods = set()
+            for node in ast.walk(tree):
+                if isinstance(node, ast.ClassDef):
+                    methods |= {id(one) for one in node.body if isinstance(one, ast.FunctionDef)}
+                    for name in assigned(node):
+                        found.attributes[name].add(place)
+            fields = {
+                id(target)
+                for node in ast.walk(tree)
+                if isinstance(node, ast.ClassDef)
+                for one in node.body
+                if isinstance(one, ast.Assign)
+                for target in one.targets
+            }
+            for node in ast.walk(tree):
+                own = isinstance(node, ast.Attribute) or id(node) in methods
+                for name in names_of(node) if id(node) not in fields else ():
+                    (found.attributes if own else found.variables)[name].add(place)
+        return found
+
+
+def _pairs(
+    modules: Modules, found: _Mentions, kept: Collection[str], free: dict[str, set[str]]
+) -> Iterator[tuple[str, str]]:
+    """For things at the top of modules that are nothing else the names of attributes; widely known things first."""
+    single = {
+        name
+        for tree in modules.values()
+        for name in _top(tree)
+        if name not in found.attributes and name not in kept and not name.startswith("__")
+    }
+    taken: _Places = defaultdict(set)
+    for name in sorted(single, key=lambda name: (-len(found.variables[name]), name)):
+        places = found.variables[name]
+
+        def cost(other: str, places: set[str] = places) -> tuple[int, int, str]:
+            return len(places - free[other]), len(free[other]), other
+
+        fitting = [other for other in free if not places & taken[other] and places & free[other]]
+        if fitting:
+            other = min(fitting, key=cost)
+            taken[other] |= places
+            yield name, other
+
+
+def _top(tree: ast.Module) -> Iterator[str]:
+    yield from defined(tree)
+    for node in tree.body:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield from stored(node)
+
+
+def _share_variables(modules: Modules, kept: Collection[str], used: Collection[str]) -> list[str]:
+    """The same few names, ``used`` for nothing else, for variables of all functions; those that arguments have."""
+    spare = [name for name in reversed(COMMON) if name not in used]
+    arguments, variables = spare[:_ARGUMENTS], spare[_ARGUMENTS:]
+    named = {name for tree in modules.values() for name in _keywords(tree)}.union(kept)
+    for tree in modules.values():
+        top = set(_top(tree))
+        for function in _functions(tree):
+            given = dict.fromkeys(node.arg for node in ast.walk(function) if isinstance(node, ast.arg))
+            own = [name for name in given if name not in top | named]
+            others = [
+                name for name in dict.fromkeys(stored(function)) if name not in top and name not in given
+            ]
+            new = zip(own, arguments, strict=False), zip(others, variables, strict=False)
+            _Variables({old: one for pairs in new for old, one in pairs}).visit(function)
+    return arguments
+
+
+class _Variables(ast.NodeTransformer):
+    """Other names for variables and arguments; attributes stay."""
+
+    def __init__(self, names: dict[str, str]) -> None:
+        self._names = names
+
+    def visit(self, node: ast.AST) -> ast.AST:
+        new = self._names
+        match node:
+            case ast.Name(id=name):
+                node.id = new.get(name, name)
+            case ast.arg(arg=name):
+                node.arg = new.get(name, name)
+            case ast.ExceptHandler(name=str(name)):
+                node.name = new.get(name, name)
+            case ast.alias():
+                shown = node.asname or node.name
+                if new.get(shown, shown) != shown:
+                    node.asname = new[shown]
+        return self.generic_visit(node)
+
+
+def _keywords(tree: ast.Module) -> Iterator[str]:
+    """The names by which calls give arguments."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.keyword) and node.arg:
+            yield node.arg
+
+
+def _functions(tree: ast.Module) -> Iterator[ast.FunctionDef]:
+    classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+    for body in (tree.body, *(node.body for node in classes)):
+        yield from (node for node in body if isinstance(node, ast.FunctionDef))
+
+
+def _all_names(trees: Modules) -> Iterator[str]:
+    for tree in trees.values():
+        for node in ast.walk(tree):
+            yield from names_of(node)
