@@ -24,6 +24,7 @@ from muros.cli._small._exports import find_exports
 from muros.cli._small._inline import inline
 from muros.cli._small._join import join, moved
 from muros.cli._small._names import COMMON, OFFERED, STATIC
+from muros.cli._small._order import order
 from muros.cli._small._program import Programs
 from muros.cli._small._prune import prune, unlend
 from muros.cli._small._reach import Reach
@@ -64,7 +65,7 @@ def small(tree: Tree, programs: Iterable[str], most: int | None = None) -> tuple
         rest[moved(name).replace(".", "/") + ".py"] = rest.pop(path)
     floor = {name: strip(node, {*native, *floor}) for name, node in floor.items()}
     floor = _reached(floor, messages, of_native, said)
-    asked = strings([*floor.values(), *messages.values()])
+    asked = strings([*floor.values(), *messages.values()], {*floor, *native})
     kept = said.shown | OFFERED | of_native | asked | own(messages)
     modules = join(floor, messages, native, said, most)
     for _ in range(_ROUNDS):
@@ -76,7 +77,10 @@ def small(tree: Tree, programs: Iterable[str], most: int | None = None) -> tuple
     names |= {name: names.get(other, other) for name, other in pairs.items()}
     out = dict(rest)
     for name, node in (modules | messages).items():
-        ast.fix_missing_locations(Renamer(names, {*modules, *native}).visit(node))
+        Renamer(names, {*modules, *native}).visit(node)
+        if most is None and name in modules:
+            order(node)
+        ast.fix_missing_locations(node)
         path = name.replace(".", "/") + (_PACKAGE if name in packages else ".py")
         out[path] = ast.unparse(node).encode()
     return out, dict(sorted(names.items()))

@@ -38,7 +38,9 @@ def prune(modules: Modules, reach: Reach, foreign: Collection[str]) -> Modules:
 def unlend(modules: Modules) -> None:
     """Classes and modules no longer look for their functions in modules that have none left."""
     for tree in modules.values():
-        for scope in (tree, *(node for node in tree.body if isinstance(node, ast.ClassDef))):
+        scopes: list[ast.Module | ast.ClassDef] = [tree]
+        scopes += [node for node in tree.body if isinstance(node, ast.ClassDef)]
+        for scope in scopes:
             looked = {place for node in scope.body for place in _lenders(node)}
             if looked and not any(_gives(modules, place) for place in looked):
                 scope.body = [one for one in scope.body if not _lenders(one) and not _looks(one)]

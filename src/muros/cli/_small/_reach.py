@@ -171,7 +171,7 @@ class Reach(Knowledge):
     def _called(self, func: ast.expr, env: Environment) -> list[tuple[Known, int]]:
         """What a call may be of, and how many parameters it does not show."""
         match func:
-            case ast.Name(id=name) if name not in env:
+            case ast.Name(id=name) if name not in env or (self.place, name) in self._sources:
                 made = [
                     (known, 1)
                     for place, node in self.classes.get(name, ())

@@ -66,15 +66,17 @@ def own(messages: Modules) -> set[str]:
     return names
 
 
-def strings(trees: Iterable[ast.Module]) -> set[str]:
-    """Names in strings by which attributes may be asked for: those in functions that ask so."""
+def strings(trees: Iterable[ast.Module], places: Collection[str]) -> set[str]:
+    """Names in strings by which attributes may be asked for: those in functions that ask so, but paths of modules."""
     names: set[str] = set()
     for tree in trees:
         for function in ast.walk(tree):
             if isinstance(function, ast.FunctionDef) and asks(function):
                 for node in ast.walk(function):
                     if isinstance(node, ast.Constant) and isinstance(node.value, str):
-                        names.update(word for word in _BETWEEN.split(node.value) if word.isidentifier())
+                        words = [word for word in _BETWEEN.split(node.value) if word]
+                        if node.value not in places and all(map(str.isidentifier, words)):
+                            names.update(words)
     return names
 
 

@@ -8,15 +8,13 @@ file; where a board compiles, few names serve for those of all functions.
 from __future__ import annotations
 
 import ast
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
 
 from muros.cli._small._names import COMMON
-from muros.cli._small._trees import Modules, assigned, defined, names_of, stored
+from muros.cli._small._trees import Modules, defined, names_of, stored
 
 _ARGUMENTS = 12  # names that arguments share
-_Places = defaultdict[str, set[str]]
 
 
 def share(
@@ -28,7 +26,7 @@ def share(
     names stay, and nothing gets one of those by which attributes are ``asked`` for.
     """
     arguments = _share_variables(modules, kept, {*kept, *_all_names(modules | messages)})
-    found = _Mentions.of(modules | messages)
+    found = _Mentions(modules | messages)
     free = {
         name: places
         for name, places in found.attributes.items()
@@ -46,56 +44,75 @@ def share(
     return dict(_pairs(modules, found, kept, free))
 
 
-@dataclass
 class _Mentions:
     """Where names stand for attributes, and where for variables or for what calls name."""
 
-    attributes: _Places = field(default_factory=lambda: defaultdict(set))
-    variables: _Places = field(default_factory=lambda: defaultdict(set))
-
-    @classmethod
-    def of(cls, trees: Modules) -> _Mentions:
-        found = cls()
+    def __init__(self, trees: Modules) -> None:
+        self.attributes: dict[str, set[str]] = defaultdict(set)
+        self.variables: dict[str, set[str]] = defaultdict(set)
+        self.of_classes: set[str] = set()
+        self.in_classes: set[str] = set()
+        """Variables that the bodies of classes read: they look first for what the class has."""
         for place, tree in trees.items():
-            methods = set()
+            own: set[int] = set()
             for node in ast.walk(tree):
                 if isinstance(node, ast.ClassDef):
-                    methods |= {id(one) for one in node.body if isinstance(one, ast.FunctionDef)}
-                    for name in assigned(node):
-                        found.attributes[name].add(place)
-            fields = {
-                id(target)
-                for node in ast.walk(tree)
-                if isinstance(node, ast.ClassDef)
-                for one in node.body
-                if isinstance(one, ast.Assign)
-                for target in one.targets
-            }
+                    own.update(self._of_class(node))
             for node in ast.walk(tree):
-                own = isinstance(node, ast.Attribute) or id(node) in methods
-                for name in names_of(node) if id(node) not in fields else ():
-                    (found.attributes if own else found.variables)[name].add(place)
-        return found
+                kind = (
+                    self.attributes if isinstance(node, ast.Attribute) or id(node) in own else self.variables
+                )
+                for name in names_of(node):
+                    kind[name].add(place)
+
+    def _of_class(self, node: ast.ClassDef) -> Iterator[int]:
+        """Notes what a class has and what its body reads; the nodes that give something its name."""
+        for one in node.body:
+            read: list[ast.AST] = [one]
+            if isinstance(one, ast.FunctionDef):
+                self.of_classes.add(one.name)
+                yield id(one)
+                arguments = one.args
+                read = [*one.decorator_list, *arguments.defaults, *filter(None, arguments.kw_defaults)]
+            elif isinstance(one, ast.Assign):
+                read = [one.value]
+                for target in one.targets:
+                    if isinstance(target, ast.Name):
+                        self.of_classes.add(target.id)
+                        yield id(target)
+            self.in_classes.update(
+                name for each in read for part in ast.walk(each) for name in names_of(part)
+            )
 
 
 def _pairs(
     modules: Modules, found: _Mentions, kept: Collection[str], free: dict[str, set[str]]
 ) -> Iterator[tuple[str, str]]:
-    """For things at the top of modules that are nothing else the names of attributes; widely known things first."""
+    """For things at the top of modules that are nothing else the names of attributes; widely known things first.
+
+    Names that are said often are given first: those that a module defines have the lowest numbers in its compiled file,
+    and a number below 128 takes one byte.
+    """
+    often = Counter(name for tree in modules.values() for name in _all_names({"": tree}))
     single = {
         name
         for tree in modules.values()
         for name in _top(tree)
         if name not in found.attributes and name not in kept and not name.startswith("__")
     }
-    taken: _Places = defaultdict(set)
+    taken: dict[str, set[str]] = defaultdict(set)
     for name in sorted(single, key=lambda name: (-len(found.variables[name]), name)):
         places = found.variables[name]
 
         def cost(other: str, places: set[str] = places) -> tuple[int, int, str]:
-            return len(places - free[other]), len(free[other]), other
+            return len(places - free[other]), -often[other], other
 
-        fitting = [other for other in free if not places & taken[other] and places & free[other]]
+        hidden = found.of_classes if name in found.in_classes else ()
+        fitting = [
+            other
+            for other in free
+            if not places & taken[other] and places & free[other] and other not in hidden
+        ]
         if fitting:
             other = min(fitting, key=cost)
             taken[other] |= places
@@ -111,8 +128,8 @@ def _top(tree: ast.Module) -> Iterator[str]:
 
 def _share_variables(modules: Modules, kept: Collection[str], used: Collection[str]) -> list[str]:
     """The same few names, ``used`` for nothing else, for variables of all functions; those that arguments have."""
-    spare = [name for name in reversed(COMMON) if name not in used]
-    arguments, variables = spare[:_ARGUMENTS], spare[_ARGUMENTS:]
+    spare = [name for name in COMMON if name not in used]
+    arguments, variables = spare[:_ARGUMENTS], spare[:_ARGUMENTS:-1]
     named = {name for tree in modules.values() for name in _keywords(tree)}.union(kept)
     for tree in modules.values():
         top = set(_top(tree))

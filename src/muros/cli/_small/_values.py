@@ -110,8 +110,10 @@ class Knowledge:
         return id(function) in self._varied or (id(function), parameter) in self._explicit
 
     def is_left_out(self, function: ast.FunctionDef, parameter: str) -> bool:
-        """Whether a call leaves a parameter to its default."""
-        return id(function) in self._varied or (id(function), parameter) in self._left_out
+        """Whether a call leaves a parameter to its default, or may do so unseen."""
+        if id(function) in self._varied or (id(function), parameter) not in self._explicit:
+            return True
+        return (id(function), parameter) in self._left_out
 
     def attribute(self, name: str) -> Values:
         """What an attribute of this name may be."""
