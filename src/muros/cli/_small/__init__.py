@@ -28,7 +28,7 @@ from muros.cli._small._order import order
 from muros.cli._small._program import Programs
 from muros.cli._small._prune import prune, unlend
 from muros.cli._small._reach import Reach
-from muros.cli._small._rename import Renamer, own, shortened, strings
+from muros.cli._small._rename import Renamer, import_near, own, shortened, strings
 from muros.cli._small._share import share
 from muros.cli._small._strip import strip
 from muros.cli._small._tidy import tidy
@@ -78,6 +78,7 @@ def small(tree: Tree, programs: Iterable[str], most: int | None = None) -> tuple
     out = dict(rest)
     for name, node in (modules | messages).items():
         Renamer(names, {*modules, *native}).visit(node)
+        import_near(node, name if name in packages else name.rpartition(".")[0])
         if most is None and name in modules:
             order(node)
         ast.fix_missing_locations(node)

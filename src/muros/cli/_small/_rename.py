@@ -50,6 +50,19 @@ def _assigned(tree: ast.Module) -> set[str]:
     return set[str]().union(*map(assigned, scopes))
 
 
+def import_near(tree: ast.Module, package: str) -> None:
+    """Says where things of muros are imported from as seen from the module's package, which needs less of their path."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and package.split(".")[0] == HOME and not node.level:
+            path, own = str(node.module).split("."), package.split(".")
+            if path[0] == HOME:
+                same = next(
+                    (i for i, pair in enumerate(zip(path, own)) if len(set(pair)) > 1),
+                    min(len(path), len(own)),
+                )
+                node.module, node.level = ".".join(path[same:]) or None, len(own) - same + 1
+
+
 def own(messages: Modules) -> set[str]:
     """The names of message classes; what they import from the floor is the floor's."""
     names: set[str] = set()
