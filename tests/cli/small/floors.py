@@ -59,7 +59,10 @@ def run(tree: Tree, program: str) -> str:
         return module
 
     def find(name: str, given: Any = None, local: Any = None, parts: Any = (), level: int = 0) -> ModuleType:
-        assert not level
+        if level:  # from a module's package, or from those above
+            above = given["__name__"].split(".")
+            is_module = f"{'/'.join(above)}.py" in tree
+            name = ".".join([*above[: len(above) - level + (not is_module)], *filter(None, [name])])
         module = load(name)
         for part in parts or ():
             if not hasattr(module, part) and part != "*":

@@ -141,7 +141,8 @@ def _share_variables(modules: Modules, kept: Collection[str], used: Collection[s
             ]
             new = zip(own, arguments, strict=False), zip(others, variables, strict=False)
             _Variables({old: one for pairs in new for old, one in pairs}).visit(function)
-    return arguments
+    said = set(_all_names(modules))
+    return [name for name in arguments if name in said]
 
 
 class _Variables(ast.NodeTransformer):

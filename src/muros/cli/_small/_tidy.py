@@ -32,9 +32,10 @@ class _Tidy(ast.NodeTransformer):
         self.generic_visit(node)
         names = Counter(one.id for one in ast.walk(node) if isinstance(one, ast.Name))
         given = Counter(stored(node))
-        arguments = {one.arg for one in ast.walk(node) if isinstance(one, ast.arg)}
+        arguments = Counter(one.arg for one in ast.walk(node) if isinstance(one, ast.arg))
         once = {name for name, count in given.items() if count == 1 and name not in arguments}
-        fixed = once | (arguments - set(given))
+        own = {one.arg for one in ast.walk(node.args) if isinstance(one, ast.arg)}
+        fixed = once | {name for name in own if arguments[name] == 1 and name not in given}
         node.body = _without_aliases(node.body, once, fixed)
         _at_once(node, {name for name in once if names[name] == 2})
         return node
