@@ -3,11 +3,10 @@
 A board keeps every name of its code in memory, about 20 bytes each, and no collector frees them; a module takes some
 300 bytes beside its code. ``small`` rewrites the syntax trees of the floor for a program that it can read:
 
+- What the program does not reach goes, with the options that it does not say, docstrings and annotations.
+- Modules that are needed at the same time are joined, functions that are called once become part of their caller.
 - A name of the floor's own that the program does not say becomes one that every firmware has anyway, ``pow`` or
-  ``KeyError``. Such a name costs nothing. One map holds for all modules and for all kinds of names, and two names never
-  become one, so whatever referred to the same thing still does, and nothing needs to be known about scopes and types.
-- Modules that the program keeps in memory all the time are joined into the package ``muros`` itself.
-- Constants are put where they are used; docstrings, annotations and functions that nothing mentions go.
+  ``KeyError``. One map holds for all modules, and two attributes never become one, nor do two variables that meet.
 
 Kept are: words of the program; names in strings of the floor, as for ``getattr``; names of messages; what firmware
 offers. So a program that says what it uses runs unchanged. What it does not say it cannot find.
