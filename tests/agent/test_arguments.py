@@ -340,6 +340,14 @@ def test_the_command_line_has_the_last_word(tmp_path: Path) -> None:
             ":3: devices: a serial link has one device: use multiserial",
         ),
         ("[[link]]\nkind = 'udp4'\nport = 1\nbind = '::1'", ":4: bind ::1: not an IPv4 address"),
+        ("limits = 3", ":1: limits: write limits as a [limits] table"),
+        (
+            "[[link]]\nkind = 'udp4'\nport = 1\n[limits]\nwindow = 4\nmax_cliens = 1",
+            ":6: [limits] max_cliens: unknown limit (did you mean max_clients?); there are window,",
+        ),
+        ("[limits]\nmax-clients = 'a'", ":2: [limits] max-clients: a number is needed"),
+        ("[limits]\nwindow = 4\nmax-clients = 0", ":3: [limits] max_clients is 0: it must be at least 1"),
+        ("limits.window = 3", ": [limits] window is 3: it must be 1, 2, 4, 8 or 16 messages"),
     ],
 )
 def test_a_wrong_configuration_file_is_one_line_with_its_place(

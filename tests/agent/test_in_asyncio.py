@@ -2,12 +2,13 @@
 
 import asyncio
 import socket
+from pathlib import Path
 
 import pytest
 
 from muros.agent import Agent, ClientConnected, ClientGone, Event, LinkUp
 from muros.findings import Finding, Findings
-from muros.links import LinkError, UdpLink
+from muros.links import LinkError, SerialLink, UdpLink
 
 CREATE_CLIENT = bytes.fromhex("8000000000011000585243450100010faabbccdd8100fc01")
 STATUS_AGENT = bytes.fromhex("8100000004010b000000585243450100010f00")
@@ -67,6 +68,24 @@ def test_repeats_of_a_finding_are_summarised_by_themselves() -> None:
     assert first.new == 1
     assert last.count == 4
     assert last.since is not None
+
+
+def test_each_port_of_a_multiserial_link_is_told_of(tmp_path: Path) -> None:
+    async def program() -> list[Finding]:
+        agent = Agent("local:")
+        agent.add_link(SerialLink([f"{tmp_path}/a", f"{tmp_path}/b"]))
+        told: list[Finding] = []
+        agent.on_finding(told.append)
+        await agent.start()
+        agent.close()
+        return told
+
+    first, second = asyncio.run(program())
+    assert first.code == second.code == "port-absent"
+    assert first.format().startswith(
+        f"finding: multiserial {tmp_path}/a {tmp_path}/b at 115200: {tmp_path}/a is not"
+    )
+    assert f": {tmp_path}/b is not open: there is no such device now." in second.format()
 
 
 def test_a_link_added_while_running_opens_at_once_and_a_busy_port_says_so() -> None:

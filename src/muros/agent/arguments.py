@@ -384,7 +384,7 @@ def _read_limits(table: object, path: Path, text: str) -> Limits:
     read: dict[str, Any] = {}
     for key, value in table.items():
         name = key.replace("-", "_")
-        said = f"{path}: [limits] {key}"
+        said = f"{_where(path, text, 'limits', key)}: [limits] {key}"
         if name not in known:
             raise UsageError(f"{said}: unknown limit{guess(name, list(known))}; there are {', '.join(known)}")
         if not isinstance(value, bool if isinstance(known[name].default, bool) else int):
@@ -395,7 +395,8 @@ def _read_limits(table: object, path: Path, text: str) -> Limits:
     try:
         return Limits(**read)
     except ValueError as error:
-        raise UsageError(f"{path}: [limits] {error}") from None
+        name = str(error).partition(" ")[0]
+        raise UsageError(f"{_where(path, text, 'limits', name)}: [limits] {error}") from None
 
 
 def _limits(given: _Given) -> Limits:
@@ -428,13 +429,19 @@ def _config_value(option: Option, value: object, said: str) -> Value:
 
 def _said(path: Path, text: str, link: int, key: str) -> str:
     """File, line and key of a setting; `link` counts the [[link]] tables from 0, -1 is before them."""
-    table = -1
-    header = 0
+    return f"{_where(path, text, link, key)}: {key}"
+
+
+def _where(path: Path, text: str, table: int | str, key: str) -> str:
+    """File and line of a key, or of the head of its table; `table` as for `_said`, or "limits"."""
+    here: int | str = -1
+    links = header = 0
     for number, line in enumerate(text.splitlines(), 1):
         bare = "".join(line.split())
-        if bare.startswith("[[link]]"):
-            table += 1
-            header = number if table == link else header
-        elif table == link and bare.partition("=")[0].strip("\"'") == key:
-            return f"{path}:{number}: {key}"
-    return f"{path}:{header}: {key}" if header else f"{path}: {key}"
+        if bare.startswith(("[[link]]", "[limits]")):
+            here = "limits" if bare.startswith("[limits]") else links
+            links += here == links
+            header = number if table == here else header
+        elif here == table and bare.partition("=")[0].strip("\"'").replace("-", "_") == key.replace("-", "_"):
+            return f"{path}:{number}"
+    return f"{path}:{header}" if header else f"{path}"

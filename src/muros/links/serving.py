@@ -18,6 +18,9 @@ _NS_PER_MS = 1_000_000
 _AFTER_FAILURE = 100
 """When timers are looked at again after one has failed, in ms."""
 
+_OF_A_PORT = frozenset({"port-absent", "port-unusable", "line-noise"})
+"""Problems that name a port of a link with several: each port is told of, and counted, by itself."""
+
 E = TypeVar("E", bound=Event)
 
 
@@ -46,7 +49,8 @@ class LinkDoor(LinkEvents):
 
     def on_problem(self, link: Link, code: str, what: str, why: str, remedy: str, n: int) -> None:
         """Something was dropped, refused or does not work."""
-        self._voice.report(code, who=link.name, what=what, why=why, remedy=remedy, n=n)
+        subject = what if code in _OF_A_PORT else ""
+        self._voice.report(code, who=link.name, what=what, why=why, remedy=remedy, subject=subject, n=n)
 
 
 D = TypeVar("D", bound=LinkDoor)
