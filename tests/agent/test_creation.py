@@ -548,3 +548,23 @@ def test_events_tell_what_was_made() -> None:
     kinds = [event.kind for event in bench.events if isinstance(event, EntityCreated)]
     assert kinds == [1, 2, 3, 4, 5, 6]
     assert bench.events[-1].text() == f"{client.who}: node /greenhouse/thermometer: 1 writer, 1 reader"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        (
+            "58524346 0100 010f aabbccdd 81",
+            "ERR_INVALID_DATA: its cookie, key or session id is none of DDS-XRCE.",
+        ),
+        ("58524345 0100 010f 00000000 81", "Give it a key other than 0."),
+        ("58524345 0200 010f aabbccdd 81", "ERR_INCOMPATIBLE: it speaks another version than DDS-XRCE 1."),
+    ],
+)
+def test_a_refused_client_is_told_with_its_cause(wrong: str, why: str) -> None:
+    bench = Bench()
+    bench.receive(bytes.fromhex(f"80000000 00011000 {wrong} 00 fc01"))
+    (finding,) = bench.findings.snapshot()
+    assert finding.code == "client-refused"
+    assert why in finding.format()
+    assert "max_clients" not in finding.format()

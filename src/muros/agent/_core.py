@@ -53,6 +53,7 @@ from muros.xrce.constants import (
     KIND_REPLIER,
     KIND_REQUESTER,
     LITTLE_ENDIAN,
+    STATUS_ERR_INCOMPATIBLE,
     STATUS_ERR_INVALID_DATA,
     STATUS_ERR_RESOURCES,
     STATUS_NAMES,
@@ -73,6 +74,15 @@ _TWINS = 3
 """How often a living client may change its address until two devices are suspected."""
 _QUIET = 200
 """Silence after the last CREATE until a client counts as ready, in ms."""
+_REFUSALS = {
+    STATUS_ERR_INVALID_DATA: (
+        "its cookie, key or session id is none of DDS-XRCE",
+        "Give it a key other than 0.",
+    ),
+    STATUS_ERR_INCOMPATIBLE: ("it speaks another version than DDS-XRCE 1", "Update the client."),
+    STATUS_ERR_RESOURCES: ("the agent serves as many clients as it may", "Raise max_clients."),
+}
+"""Why a client is refused, and what to do about it, by status."""
 _PROBE = bytes((GET_INFO, 1, 8, 0, 0, 0, 0xFF, 0xFE, 1, 0, 0, 0))
 
 
@@ -431,8 +441,8 @@ class AgentCore(Voice[Event]):
                 who=port.link.describe(address),
                 subject=asked.key.hex(),
                 what=f"{{n}} client{{s}} at {port.link.describe(address)} refused with {STATUS_NAMES[result]}",
-                why="it is not a DDS-XRCE 1 client, or the agent serves all the clients it may",
-                remedy="Update the client, or raise max_clients.",
+                why=_REFUSALS[result][0],
+                remedy=_REFUSALS[result][1],
             )
             self._answer_create(port, address, asked, result)
             return
