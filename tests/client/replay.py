@@ -268,7 +268,7 @@ class Puppet:
         session = self.session
         writer = SimpleNamespace(
             session=session,
-            stream=Held(making.output(session, stream_id & 0x80)),
+            stream=Held(session.reliable if stream_id & 0x80 else making.best_effort(session)),
             id=object_id,
             todo=0,
             status=0,

@@ -170,6 +170,9 @@ def test_profiles_of_ros() -> None:
         assert made.depth == expected["depth"]
         assert made.lifespan == expected.get("lifespan_s", 0) * 1000
     assert profile("default") is profile("default")
+    session = Session(Wire(), 1)
+    for name in ("default", "services", "sensor_data", "parameters"):
+        assert session.writer(session.participant("n"), "rt/a", "a/msg/B", name).qos == profile(name).asked
     with pytest.raises(ValueError, match="no QoS profile 'fast'"):
         profile("fast")
     with pytest.raises(ValueError, match="durability is one of"):

@@ -50,8 +50,8 @@ def test_let_as_the_guide_has_it(stage: Stage) -> None:
             assert time.monotonic() < end
             control.spin_one_period()
             stage.executors[1].spin_some()
-        assert control.due is not None
-        assert left[i - 1] >= control.due, "it left when the period had ended"
+        assert control.period_end is not None
+        assert left[i - 1] >= control.period_end, "it left when the period had ended"
         stage.until(lambda: len(moved) == i)  # noqa: B023
     assert moved == [-1, -2, -3]
 

@@ -210,10 +210,10 @@ class Session(board.Session):
         except Exception as error:
             self.raised = error
 
-    def index(self, kind: int) -> int:
-        """A new index for an object of a kind; when each was used, that of a deleted one. ValueError for none."""
+    def new_id(self, kind: int) -> int:
+        """The id of a new object of a kind; when each was used, that of a deleted one. ValueError for none."""
         unused = _unused(self, kind) if self.counts[kind] == _INDICES else None
-        return unused[0] if unused else making.index(self, kind)
+        return unused[0] if unused else making.new_id(self, kind)
 
     def attempting(self, now: int) -> None:
         """Tells how long nobody has answered."""
@@ -272,7 +272,7 @@ def _check(
 
 
 def _unused(session: board.Session, kind: int) -> list[int]:
-    """The indices that no object of a kind has, nor one whose DELETE is not acknowledged."""
+    """The ids that no object of a kind has, nor one whose DELETE is not acknowledged."""
     used = {
         entity.object_id(step)
         for entity in session.entities
@@ -295,7 +295,7 @@ def _unused(session: board.Session, kind: int) -> list[int]:
     if session.backlog is not None:
         for data in session.backlog.items:
             deleted(data, 0, len(data))
-    return [index for index in range(_INDICES) if index << 4 | kind not in used]
+    return [number for number in range(kind, _INDICES << 4, 16) if number not in used]
 
 
 def _remember(session: Session) -> None:

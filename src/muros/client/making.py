@@ -5,7 +5,6 @@ Boards borrow this; functions with ``self`` are methods of ``session.Session``.
 
 from muros.client.entities import renew
 from muros.client.names import dds_type, topic_name
-from muros.client.qos import profile, within
 from muros.client.session import Entity
 from muros.compat import borrow, const
 
@@ -32,11 +31,14 @@ _QOS_RELIABLE = const(0x01)
 _PARENT_BITS = const(12)
 _STREAM_BEST_EFFORT = const(0x01)
 _INDICES = const(4096)
+_USUAL = ("default", "services")  # profiles: reliable, the last 10 samples
+_RELIABLE_LAST_10 = (0x03, 10, 0, 0)
 
 
 def participant(self: "Session", name: str, domain: int = 0) -> Entity:
     """A DDS participant, the node of ROS. ValueError for a name longer than 59 characters, or for no domain."""
-    within("domain", domain, _LAST_DOMAIN)
+    if domain != 0:
+        borrow("muros.client.qos").within("domain", domain, _LAST_DOMAIN)
     topic_name("", name)
     made = Entity()
     made.domain = domain
@@ -87,10 +89,8 @@ def replier(
     return enter(Replier(on_request), self, node, name, kind, qos, _KIND_REPLIER)
 
 
-def output(self: "Session", reliable: int) -> "Output":
-    """The stream to write to; the one for best effort is made at the first need."""
-    if reliable:
-        return self.reliable
+def best_effort(self: "Session") -> "Output":
+    """The stream to write to without acknowledgements; it is made at the first need."""
     if _STREAM_BEST_EFFORT not in self.outputs:
         self.outputs[_STREAM_BEST_EFFORT] = borrow("muros.xrce.beginning").make_output(
             _STREAM_BEST_EFFORT, self.reliable.mtu, self.head, 1, 0
@@ -99,13 +99,13 @@ def output(self: "Session", reliable: int) -> "Output":
     return stream
 
 
-def index(self: "Session", kind: int) -> int:
-    """A new index for an object of a kind. ValueError after the last; hosts use those of deleted objects again."""
+def new_id(self: "Session", kind: int) -> int:
+    """The id of a new object of a kind. ValueError after the last; hosts use those of deleted objects again."""
     index = self.counts[kind]
     if index == _INDICES:
         raise ValueError("no room for one more: a session has at most 4096 objects of a kind")
     self.counts[kind] = index + 1
-    return index
+    return index << 4 | kind
 
 
 def enter(
@@ -115,17 +115,21 @@ def enter(
 
     What cannot be is complained about now, not when the agent is asked for it.
     """
-    made.qos = profile(qos).asked
+    made.qos = _RELIABLE_LAST_10
+    if qos not in _USUAL:
+        made.qos = borrow("muros.client.qos").profile(qos).asked
+    if kind != _KIND_DATAREADER:
+        made.stream = session.reliable
+        if not (qos in _USUAL or made.qos[0] & _QOS_RELIABLE):
+            made.stream = best_effort(session)
     made.type_name = type_name
     made.above = node.id >> 4
-    if hasattr(made, "room"):  # a side of a service
+    if kind < _KIND_REQUESTER:
+        dds_type(type_name)
+        made.above |= session.new_id(_KIND_TOPIC) << _PARENT_BITS
+    else:
         dds_type(type_name, "_Response")
         topic_name("rq", name, "Request")
-    else:
-        dds_type(type_name)
-        made.above |= (session.index(_KIND_TOPIC) << 4 | _KIND_TOPIC) << _PARENT_BITS
-    if kind != _KIND_DATAREADER:
-        made.stream = output(session, made.qos[0] & _QOS_RELIABLE)
     _add(made, session, name, kind)
     if kind != _KIND_DATAWRITER:
         session.objects[made.id] = made
@@ -136,7 +140,7 @@ def _add(made: Entity, session: "Session", name: str, kind: int) -> None:
     """Has an entity created, now or when the session is connected."""
     made.session = session
     made.name = name
-    made.id = session.index(kind) << 4 | kind
+    made.id = session.new_id(kind)
     renew(made)
     session.entities.append(made)
     session.pending += 1

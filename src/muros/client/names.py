@@ -13,13 +13,9 @@ def resolve(name: str, namespace: str, node: str) -> str:
     """
     if not name:
         raise ValueError("a topic or service needs a name")
-    if "{" in name:
-        name = name.replace("{node}", node).replace("{namespace}", namespace).replace("{ns}", namespace)
-    if name[0] == "~":
-        name = node + name[1:]
-    elif name[0] == "/":
-        return name
-    return namespace + name if namespace[-1:] == "/" else namespace + "/" + name
+    if "{" in name or "~" in name or "/" in name:
+        return _expanded(name, namespace, node)
+    return _below(namespace, name)
 
 
 def topic_name(prefix: str, name: str, suffix: str = "", limit: int = _NAME) -> str:
@@ -41,6 +37,18 @@ def dds_type(ros: str, suffix: str = "", limit: int = _TYPE) -> str:
     if len(parts) != 3:
         raise ValueError("%r is no type: it should read like std_msgs/msg/String" % ros)
     return _limited("type " + ros, parts[0] + "::" + parts[1] + "::dds_::" + parts[2] + suffix + "_", limit)
+
+
+def _expanded(name: str, namespace: str, node: str) -> str:
+    """The full name for one that may be more than a word."""
+    name = name.replace("{node}", node).replace("{namespace}", namespace).replace("{ns}", namespace)
+    if name[0] == "~":
+        name = node + name[1:]
+    return name if name[0] == "/" else _below(namespace, name)
+
+
+def _below(namespace: str, name: str) -> str:
+    return "/" + name if namespace == "/" else namespace + "/" + name
 
 
 def _limited(ros: str, made: str, limit: int) -> str:

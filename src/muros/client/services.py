@@ -5,15 +5,17 @@ of that WRITE_DATA. At the replier a request begins with the identity of its sam
 has to begin with the same.
 """
 
+from struct import pack_into
+
 from muros.client.session import Entity
-from muros.compat import const, copy
+from muros.compat import const
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from collections.abc import Callable
     from typing import Any
 
-    from muros.client._types import Message, Outgoing
+    from muros.client._types import Message
     from muros.xrce._types import Buffer
 
     OnReply = Callable[[int, Buffer, int, int], object]
@@ -32,12 +34,12 @@ class Service(Entity):
     def room(self) -> bool:
         """Whether a sample that is written now can go out."""
         session = self.session
-        stream = session.reliable
+        stream = self.stream
         return (
             session.state == _CONNECTED
             and session.backlog is None
             and self.todo == 0
-            and (self.stream is not stream or stream.next - stream.first & 0xFFFF < stream.history)
+            and stream.next - stream.first & 0xFFFF < stream.history
         )
 
 
@@ -55,31 +57,31 @@ class Requester(Service):
 
 
 class Replier(Service):
-    """The server's side. ``callback(identity, buf, off, n)`` gets requests; ``reply`` answers them, at any time."""
+    """The server's side. ``callback(identity, buf, off, n)`` gets requests; ``reply`` answers them, at any time.
+
+    What it publishes is itself: the reply behind the identity of the request.
+    """
+
+    if TYPE_CHECKING:
+        _identity: bytes
+        _reply: "Message"
 
     def reply(self, identity: bytes, reply: "Message") -> bool:
         """Answers the request of that identity; False when it was not taken."""
-        return self.publish(_Identified(identity, reply))
+        self._identity = identity
+        self._reply = reply
+        return self.publish(self)
+
+    def size(self) -> int:
+        """Bytes of the body."""
+        return _IDENTITY + self._reply.size()
+
+    def write(self, buf: bytearray, off: int) -> int:
+        """Writes the body at ``off`` and returns its end."""
+        pack_into("24s", buf, off, self._identity)
+        return self._reply.write(buf, off + _IDENTITY)
 
     def deliver(self, buf: "Buffer", off: int, n: int) -> None:
         """Takes a request."""
         if n >= _IDENTITY:
-            identity = bytes(memoryview(buf)[off : off + _IDENTITY])
-            self.callback(identity, buf, off + _IDENTITY, n - _IDENTITY)
-
-
-class _Identified:
-    """A message behind the identity of the request it answers."""
-
-    def __init__(self, identity: bytes, message: "Outgoing") -> None:
-        self.identity = identity
-        self.message = message
-
-    def size(self) -> int:
-        """Bytes of the body."""
-        return _IDENTITY + self.message.size()
-
-    def write(self, buf: bytearray, off: int) -> int:
-        """Writes the body at ``off`` and returns its end."""
-        copy(buf, off, self.identity, 0, _IDENTITY)
-        return self.message.write(buf, off + _IDENTITY)
+            self.callback(bytes(buf[off : off + _IDENTITY]), buf, off + _IDENTITY, n - _IDENTITY)

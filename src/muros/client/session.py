@@ -108,7 +108,7 @@ class Session(SessionCore):
         replier = making.replier
         ping = methods.ping
         close = methods.close
-        index = making.index
+        new_id = making.new_id
         make_input = methods.make_input
         too_long = methods.too_long
         dropped = methods.dropped

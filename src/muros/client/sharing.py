@@ -261,3 +261,8 @@ class Replier(_Side, services.Replier):
     """The server's side of a service, for any thread."""
 
     KIND = 8
+
+    def reply(self, identity: bytes, reply: Message) -> bool:
+        """Answers a request; False when it was not taken."""
+        with self.session.lock:
+            return super().reply(identity, reply)

@@ -64,7 +64,6 @@ class Node:
         entities: "list[Entity]"
         participant: "Any"
 
-        begin_in = node.begin_in
         publisher = node.publisher
         subscription = node.subscription
         timer = node.timer

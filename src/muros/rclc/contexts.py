@@ -1,6 +1,6 @@
 """The methods of contexts. Boards borrow this."""
 
-from muros.compat import const, ticks_ms
+from muros.compat import borrow, const, ticks_ms
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ def node(self: "Context", name: str, namespace: str = "") -> "Node":
     from muros.rclc.context import Node
 
     made = Node()
-    made.begin_in(self, name, namespace)
+    borrow("muros.rclc.node").begin_in(made, self, name, namespace)
     return made
 
 

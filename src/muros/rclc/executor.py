@@ -34,9 +34,9 @@ class Executor:
     """
 
     stopped = False
-    period = 0.0  # ms
+    period: float = 0  # ms
     let: "Any" = None
-    due: "Any" = None  # when the period ends
+    period_end: "Any" = None  # a tick
 
     def __init__(
         self,

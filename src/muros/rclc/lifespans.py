@@ -75,9 +75,10 @@ class ExpiringService(Service):
             self._since.append(now)
 
 
-def expiring(handle: "Any") -> "Any":
-    """The class here in place of ``Subscription`` or ``Service``."""
-    return ExpiringService if handle is Service else ExpiringSubscription
+def expiring(handle: "Any", lifespan: int) -> "Any":
+    """What makes handles of the class here that stands in place of ``Subscription`` or ``Service``."""
+    made = ExpiringService if handle is Service else ExpiringSubscription
+    return lambda context, kind, callback: made(context, kind, callback, lifespan)
 
 
 def drop(since: "Any", waiting: "Any", lifespan: int, now: int) -> int:

@@ -9,30 +9,34 @@ from muros.compat import borrow, const
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any
+    from typing import Any, TypeVar
 
     from muros.client.qos import Qos
     from muros.rclc._types import Publisher
     from muros.rclc.client import Client
     from muros.rclc.context import Context, Node
+    from muros.rclc.executor import Handle
     from muros.rclc.memory import Rules
     from muros.rclc.service import Service
     from muros.rclc.subscription import Subscription
     from muros.rclc.timer import Timer
+
+    Made = TypeVar("Made", bound=Handle)
+
+_ROOT = ("", "/")
 
 
 def begin_in(self: "Node", context: "Context", name: str, namespace: str) -> None:
     """Sets up a node."""
     _check(name)
     full = name
-    if namespace[:1] != "/":
-        namespace = "/" + namespace
-    if namespace != "/":
-        _check(namespace[1:])
-        full = namespace + "/" + name
+    self.namespace = "/"
+    if namespace not in _ROOT:
+        self.namespace = namespace if namespace[0] == "/" else "/" + namespace
+        _check(self.namespace[1:])
+        full = self.namespace + "/" + name
     self.context = context
     self.name = name
-    self.namespace = namespace
     self.entities = []
     self.participant = context.middleware.participant(full, context.domain_id)
 
@@ -59,26 +63,24 @@ def subscription(
     """
     from muros.rclc.subscription import Subscription
 
-    made: "Subscription" = _made(self, Subscription, kind, callback, qos)
+    handle = Subscription if isinstance(qos, str) else _expiring(Subscription, qos)
+    made = handle(self.context, kind, callback)
     taker = memory.guard(made, kind) if memory else made
-    reader = self.context.middleware.reader(
+    made.entity = self.context.middleware.reader(
         self.participant,
         self._topic(topic),
         kind.TYPE,
         qos,
         taker,  # type: ignore[arg-type]  # a session calls its ``deliver``, which saves the heap a bound method
     )
-    _join(self, made, reader)
-    return made
+    return _join(self, made)
 
 
 def timer(self: "Node", period: float, callback: "Callable[[], object]", autostart: bool = True) -> "Timer":
     """A timer; an executor calls ``callback()`` every ``period`` seconds, to the millisecond."""
     from muros.rclc.timer import Timer
 
-    made = Timer(self.context, period, callback, autostart)
-    self.entities.append(made)
-    return made
+    return _join(self, Timer(self.context, period, callback, autostart))
 
 
 def service(
@@ -95,13 +97,13 @@ def service(
     """
     from muros.rclc.service import Service
 
-    made: "Service" = _made(self, Service, kind, callback, qos)
+    handle = Service if isinstance(qos, str) else _expiring(Service, qos)
+    made = handle(self.context, kind, callback)
     taker = memory.guard(made, kind.Request) if memory else made
-    replier = self.context.middleware.replier(
+    made.entity = self.context.middleware.replier(
         self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
     )
-    _join(self, made, replier)
-    return made
+    return _join(self, made)
 
 
 def client(
@@ -112,11 +114,10 @@ def client(
 
     made = Client(self.context, kind)
     taker = memory.guard(made, kind.Response) if memory else made
-    requester = self.context.middleware.requester(
+    made.entity = self.context.middleware.requester(
         self.participant, self._resolve(name), kind.TYPE, taker.deliver, qos
     )
-    _join(self, made, requester)
-    return made
+    return _join(self, made)
 
 
 def destroy(self: "Node") -> None:
@@ -130,21 +131,20 @@ def __getattr__(name: str) -> "Any":
     return getattr(borrow("muros.rclc.compositions"), name)
 
 
-def _made(self: "Node", handle: "Any", kind: "Any", callback: "Any", qos: "str | Qos") -> "Any":
-    """A handle of a class, or of the one in its place that drops what is too old for the QoS."""
-    lifespan = getattr(qos, "lifespan", 0)
-    if not lifespan:
-        return handle(self.context, kind, callback)
+def _expiring(handle: "Any", qos: "Qos") -> "Any":
+    """What makes handles of a class, or of the one in its place that drops what is too old for the QoS."""
+    if not qos.lifespan:
+        return handle
     from muros.rclc.lifespans import expiring
 
-    return expiring(handle)(self.context, kind, callback, lifespan)
+    return expiring(handle, qos.lifespan)
 
 
-def _join(self: "Node", made: "Any", entity: "Any") -> None:
-    """Gives a handle what the middleware has made for it; from now on executors run it."""
-    made.entity = entity
+def _join(self: "Node", made: "Made") -> "Made":
+    """From now on executors run a handle."""
     self.context.handles.append(made)
     self.entities.append(made)
+    return made
 
 
 def _topic(self: "Node", name: str) -> str:

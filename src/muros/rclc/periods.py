@@ -65,7 +65,7 @@ def spin_period(executor: "Any", period: float = 0) -> None:
 
     Late ones are caught up. The period may be that of the executor.
     """
-    executor.due = None
+    executor.period_end = None
     while executor.context.running and not executor.stopped:
         spin_one_period(executor, period)
     executor.stopped = False
@@ -79,10 +79,10 @@ def spin_one_period(executor: "Any", period: float = 0) -> None:
     clock = executor.context.clock
     middleware = executor.context.middleware
     let = executor.let
-    start = executor.due
+    start = executor.period_end
     if start is None:
         start = clock()
-    executor.due = ticks_add(start, ms)
+    executor.period_end = ticks_add(start, ms)
     if let is None:
         executor.beat(clock())
     else:
@@ -90,10 +90,10 @@ def spin_one_period(executor: "Any", period: float = 0) -> None:
         middleware.spin_once(clock())
         let.start(start)
         let.execute()
-    left = ticks_diff(executor.due, clock())
+    left = ticks_diff(executor.period_end, clock())
     while left > 0 and executor.context.running and (let is not None or not executor.stopped):
         middleware.wait(min(left, middleware.deadline(clock())))
         middleware.spin_once(clock())
-        left = ticks_diff(executor.due, clock())
+        left = ticks_diff(executor.period_end, clock())
     if let is not None:
         let.finish()

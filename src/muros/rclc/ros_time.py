@@ -55,6 +55,7 @@ class RosTime:
         """A timer that goes by this time; arguments as for ``Node.timer``."""
         made = RosTimer(self, period, callback, autostart)
         self.timers.append(made)
+        self.node.context.handles.append(made)
         self.node.entities.append(made)
         return made
 

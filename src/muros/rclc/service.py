@@ -64,7 +64,7 @@ class Service(Handle):
     def run(self, now: int) -> None:
         """Takes a request, calls the callback and answers."""
         self._send()
-        if self._waiting and len(self._answers) < self.depth:
+        if self._waiting:
             identity, request = self._waiting.pop(0)
             self.identity = identity
             response = self.callback(request)

@@ -26,12 +26,12 @@ class Timer(Handle):
     def __init__(
         self, context: "Context", period: float, callback: "Callable[[], object]", autostart: bool
     ) -> None:
-        super().__init__(context)
+        self.context = context
         self.callback = callback
         self.period = int(period * 1000 + 0.5)
         self.cancelled = not autostart
-        self._last = context.clock()
-        self._next = ticks_add(self._last, self.period)
+        self._last = now = context.clock()
+        self._next = ticks_add(now, self.period)
 
     def cancel(self) -> None:
         """Stops it, until ``reset``."""
@@ -47,8 +47,7 @@ class Timer(Handle):
         period = self.period
         self.since = ticks_diff(now, self._last)
         self._last = now
-        late = ticks_diff(now, self._next)
-        self._next = ticks_add(self._next, late - late % (period or 1) + period)
+        self._next = ticks_add(now, period - ticks_diff(now, self._next) % (period or 1))
         self.callback()
 
     def left(self, now: int) -> int:

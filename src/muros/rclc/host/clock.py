@@ -51,6 +51,7 @@ class Clock(RosTime):
         made = ClockTimer(self, period, callback, autostart)
         self.timers.append(made)
         made.home = self.node.entities
+        self.node.context.handles.append(made)
         self.node.entities.append(made)
         return made
 

@@ -226,8 +226,7 @@ class Node(context_.Node):
         be_callable(callback, "the callback of a timer")
         made = Timer(self.context, period, callback, autostart)
         made.home = self.entities
-        self.entities.append(made)
-        return made
+        return node_._join(self, made)
 
     def service(
         self,
@@ -415,8 +414,8 @@ class Node(context_.Node):
     def _join(self, handle: Made, entity: Any) -> Made:
         """Gives a handle what the middleware has made for it; from now on executors run it."""
         handle.home = self.entities
-        node_._join(self, handle, entity)
-        return handle
+        handle.entity = entity
+        return node_._join(self, handle)
 
     def _topic(self, name: str) -> str:
         longest = getattr(self.context.middleware, "longest_name", _LONGEST_NAME)

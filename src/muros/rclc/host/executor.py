@@ -96,7 +96,7 @@ class Executor(executor_.Executor):
         """The subscriptions that are called in each pass."""
         self.sleeper: Sleeper | None = None
         """What waits in an asyncio program."""
-        self.due: float | None = None
+        self.period_end: float | None = None
 
     # What is run
 
@@ -360,7 +360,7 @@ class Executor(executor_.Executor):
     def _until(self, condition: Callable[[], object], timeout: float | None) -> Steps[bool]:
         be_callable(condition, "the condition of spin_until")
         end = self.context.clock() + _patience(timeout)
-        self.due = None
+        self.period_end = None
         while not condition():
             left = end - self.context.clock()
             if left <= 0 or not self._going():
@@ -373,7 +373,7 @@ class Executor(executor_.Executor):
         return True
 
     def _periods(self, period: float) -> Steps[None]:
-        self.due = None
+        self.period_end = None
         try:
             while self._going():
                 yield from self._one_period(period)
@@ -384,8 +384,8 @@ class Executor(executor_.Executor):
 
     def _one_period(self, period: float) -> Steps[None]:
         clock = self.context.clock
-        start = clock() if self.due is None else self.due
-        self.due = end = start + period
+        start = clock() if self.period_end is None else self.period_end
+        self.period_end = end = start + period
         let = self.let
         if let is None:
             self.work(clock(), True)
