@@ -223,7 +223,7 @@ class Puppet:
                 )
         self.session.now = now
         self.session.deliver(message, 0, len(message))
-        if not self.session.login:
+        if not self.session.away:
             self.session.lead().turn(self.session, now)
             if self.session.backlog is not None:
                 self.session.backlog.pump()

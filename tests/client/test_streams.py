@@ -78,7 +78,7 @@ def test_a_session_survives_tcp_that_dies_in_a_send() -> None:
         session.spin_once()
         assert peer.recv(100)
         peer.sendall(framed(WELCOME))
-        until(lambda: session.spin_once() or not session.login)
+        until(lambda: session.spin_once() or not session.away)
         data = b"\x09\x01\x08\0\0\0\0\x06abcd"
         for i in range(10):
             peer.sendall(framed(bytes((0x81, 0x80, i, 0)) + data))
@@ -94,7 +94,7 @@ def test_closing_a_session_whose_way_is_dead() -> None:
     with server:
         session.spin_once()
         peer.sendall(framed(WELCOME))
-        until(lambda: session.spin_once() or not session.login)
+        until(lambda: session.spin_once() or not session.away)
         peer.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
         peer.close()
         session.close()

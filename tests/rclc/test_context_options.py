@@ -59,7 +59,7 @@ def test_an_option_that_does_not_exist() -> None:
 def test_how_long_a_close_waits(patience: int, goodbyes: int, waited: int) -> None:
     wire = Counting()
     session = Session(wire, 1, destroy_timeout=patience)
-    session.up, session.login = True, False  # connected, to an agent that has fallen silent
+    session.up, session.away = True, 0  # connected, to an agent that has fallen silent
     session.close()
     kinds = [kind for message in wire.sent for kind, *_ in submessages(message)]
     assert (kinds.count(DELETE), wire.waited) == (goodbyes, waited)

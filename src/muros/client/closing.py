@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from muros.xrce._types import Buffer
 
 _WAITING = const(0)
+_LOGIN = const(1)  # how we are away, see ``link``
 _DELETE = const(3)
 _OBJECT_CLIENT = const(0xFFFE)
 _REQUEST_LOGOUT = const(2)
@@ -36,7 +37,7 @@ def close(session: "Session", left: int = _TIMEOUT) -> None:
 
     transport = session.transport
     try:
-        while not session.login and session.up:
+        while session.away != _LOGIN and session.up:
             leave(session)
             if left > 0:
                 transport.wait(min(_PATIENCE, left))
@@ -51,7 +52,7 @@ def close(session: "Session", left: int = _TIMEOUT) -> None:
     session.transport = closed
     session.send = closed.send
     session.up = False
-    session.login = True
+    session.away = _LOGIN
     if session.state:  # as ``link.enter``, which would take a board the memory of all of ``link``
         session.state = _WAITING
         if session.on_state is not None:

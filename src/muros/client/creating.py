@@ -47,7 +47,7 @@ def accepted(session: "Session") -> None:
         renew(entity)
 
 
-def work(session: "Session", now: int) -> None:
+def go_through(session: "Session", now: int) -> None:
     """Creates what is to be created."""
     if session.asked and ticks_diff(now, session.late) >= 0:
         session.asked.clear()

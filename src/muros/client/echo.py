@@ -43,7 +43,7 @@ def ask(
         left = timeout
         while left > 0 and not answers:
             session.spin_once(clock())
-            if not asked and session.up and not session.login:
+            if not asked and session.up and not session.away:
                 send(session)
                 asked = True
             if not answers:

@@ -40,12 +40,14 @@ _SILENT = const(2)  # pings went unanswered, or the way is gone
 _KNOWN = const(3)  # the agent answered and knows the session
 _UNKNOWN = const(4)  # the agent answered and does not know it, or is out of step with it
 _EVENTS = const(5)
+# The state after it, and before that how we are away then: not at all, to be accepted, or to be heard again
 _NEXT = (
-    b"\1\0\0\0\0"  # from WAITING
-    b"\1\2\0\1\1"  # from CONNECTING
-    b"\2\2\3\2\1"  # from CONNECTED
-    b"\3\3\3\2\1"  # from LOST
+    b"\x01\x10\x10\x10\x10"  # from WAITING
+    b"\x01\x02\x10\x01\x11"  # from CONNECTING
+    b"\x02\x02\x23\x02\x11"  # from CONNECTED
+    b"\x23\x23\x23\x02\x11"  # from LOST
 )
+_LOGIN = const(1)
 
 _GET_INFO = const(2)
 _ASK = const(0x0102)  # GET_INFO, little endian
@@ -67,25 +69,18 @@ _PROBLEM_OUT_OF_STEP = const(2)
 
 def turn(session: "Session", now: int) -> None:
     """Does what there is to do for the connection, and gives the session back when it is steady."""
-    if not session.up and not session.login and session.state != LOST:
-        happened(session, _SILENT)
-    if session.login or session.state == LOST:
+    if not session.away:
+        if session.up:
+            session.watch(now)
+        else:
+            happened(session, _SILENT)
+    if session.away:
         _attempt(session, now)
-        return
-    if session.foreign >= _FOREIGN and ticks_diff(now, session.suspected) >= _OLDEST:
-        session.foreign = 0
-        happened(session, _UNKNOWN)
-        session.problem(_PROBLEM_OUT_OF_STEP)
     else:
-        session.watch(now)
-    if session.login or session.state == LOST:
-        return
-    if session.pending:
-        borrow("muros.client.creating").work(session, now)
-    if session.pending == 0:
-        if session.state == CONNECTING:
+        if session.pending:
+            borrow("muros.client.creating").go_through(session, now)
+        if not session.pending:
             happened(session, _MADE)
-        if session.foreign < _FOREIGN:
             session.guide = None
 
 
@@ -93,14 +88,8 @@ def happened(session: "Session", event: int) -> None:
     """Takes an event through the table."""
     new = _NEXT[session.state * _EVENTS + event]
     session._ping = session._tries = 0
-    session._due = None
-    if event == _UNKNOWN or new == WAITING:
-        session.login = True
-    enter(session, new)
-
-
-def enter(session: "Session", state: int) -> None:
-    """Is in a state, and tells when it is a new one."""
+    session.away = new >> 4
+    state = new & 15
     if state != session.state:
         session.state = state
         if state == CONNECTED and session.trouble:
@@ -127,25 +116,28 @@ def answer(session: "Session", kind: int, buf: "Buffer", off: int, n: int) -> No
                 happened(session, _KNOWN if buf[off + 5] else _UNKNOWN)
         elif kind == _STATUS:
             if number == _OBJECT_CLIENT:
-                session.login = True  # the agent has taken our leave
+                session.away = _LOGIN  # the agent has taken our leave
             elif session.asked:
                 borrow("muros.client.creating").status(session, request, number, buf[off + 4])
 
 
 def stranger(session: "Session", buf: "Buffer", at: int) -> None:
-    """The agent acknowledges what was never sent."""
+    """The agent acknowledges what was never sent: it may be out of step with us, and at some time is sure to be."""
     session.malformed += 1
-    session.foreign += 1
-    if session.foreign == 1:
+    if not session.foreign:
         session.suspected = session.now
-    if buf[at] == 0 and buf[at + 1] == 0:
+    session.foreign += 1
+    is_sure = session.foreign >= _FOREIGN and ticks_diff(session.now, session.suspected) >= _OLDEST
+    if not (buf[at] or buf[at + 1]):
         missing = buf[at + 2] << 8 | buf[at + 3]
         probe = session.probe
-        if probe == 0:
+        if not probe:
             _suspect(session)
-        elif missing >> probe - 1 & 1 or (probe > 16 and missing == 0):
-            session.foreign = _FOREIGN
-            session.suspected = ticks_add(session.now, -_OLDEST)
+        elif missing >> probe - 1 & 1 or (probe > 16 and not missing):
+            is_sure = True
+    if is_sure:
+        happened(session, _UNKNOWN)
+        session.problem(_PROBLEM_OUT_OF_STEP)
 
 
 def _suspect(session: "Session") -> None:
@@ -170,35 +162,33 @@ def _ask(session: "Session") -> None:
 
 def _attempt(session: "Session", now: int) -> None:
     """Tries to reach the agent, when that is due, to have it accept us or to ask whether it still knows us."""
-    if session._due is not None and ticks_diff(now, session._due) < 0:
+    if session._tries and ticks_diff(now, session._due) < 0:
         return
     if not MPY:
         session.attempting(now)
     session._due = ticks_add(now, _SOON if session.state else session.retry)
+    session._tries += 1
     try:
-        session.up = session.up or bool(session.transport.open())
+        session.up = session.up or session.transport.open()
     except OSError as error:
         session.gone(error)
     if not session.up:
         return
-    if not session.login:
+    if session.away != _LOGIN:
         session.ask()
-    elif session.state == CONNECTING and session._tries == _TRIES:
+    elif session.state == CONNECTING and session._tries > _TRIES:
         happened(session, _SILENT)
     else:
-        session._tries += 1
         message = borrow("muros.client.hello").hello(session)
         session.send(message, 0, len(message))
 
 
 def _on_status_agent(session: "Session", status: int) -> None:
-    if not session.login:
+    if session.away != _LOGIN:
         _suspect(session)  # the network repeated our CREATE_CLIENT
     elif status < 0x80:
-        session.login = False
         session.attempt = b""
         session.foreign = session.probe = 0
-        session._heard = session.now
         borrow("muros.client.creating").accepted(session)
         happened(session, _ACCEPTED)
     else:

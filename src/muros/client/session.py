@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from muros.xrce.streams import Output
 
 _CONNECTED = const(2)
-_LOST = const(3)
-_SILENT = const(2)  # an event, see ``link``
+_LOGIN = const(1)  # how we are away, see ``link``
+_SILENT = const(2)  # an event
 _GET_INFO = const(2)
 _STATUS_AGENT = const(4)
 _INFO = const(6)
@@ -35,7 +35,6 @@ _TIMESTAMP_REPLY = const(15)
 _OBJECT_AGENT = const(0xFFFD)
 _FIRST_REQUEST = const(10)
 _PAYLOAD = const(12)  # where that of a control message lies
-_FOREIGN = const(8)
 _NEVER = const(5000)
 
 _NO_READER = const(3)
@@ -75,7 +74,7 @@ class Session(SessionCore):
         transport: "Transport"
         state: int
         request: int  # behind the request id that was used last
-        login: bool  # the agent has yet to accept us
+        away: int  # 0 while the agent knows us; 1: it has yet to accept us; 2: it fell silent
         up: bool  # the transport is open
         reliable: "Output"
         drops: "array[int]"
@@ -96,9 +95,9 @@ class Session(SessionCore):
         ping_timeout: int
         ping_attempts: int
         _deliver: "OnData"
-        _due: "int | None"  # the tick of the next attempt; None: at once
+        _due: int  # the tick of the next attempt, if one was made
         _heard: int
-        _tries: int
+        _tries: int  # attempts to reach the agent in vain
         _ping: int  # the request id of the question that is open
 
         participant = making.participant
@@ -136,7 +135,7 @@ class Session(SessionCore):
         self.now = now
         taken = _receive(self) if self.up else 0
         _turn(self, now)
-        if not self.login and self.state != _LOST:
+        if not self.away:
             if self.backlog is not None:
                 self.backlog.pump()
             flush(self, self.reliable, now)
@@ -156,7 +155,7 @@ class Session(SessionCore):
         """Asks whether the agent is there, after a silence."""
         if self.keepalive == 0 or ticks_diff(now, self._heard) < self.keepalive:
             self._ping = self._tries = 0
-        elif self._ping == 0 or ticks_diff(now, self._due) >= 0:  # type: ignore[arg-type]
+        elif self._tries == 0 or ticks_diff(now, self._due) >= 0:
             self._due = ticks_add(now, self.ping_timeout)
             self._tries += 1
             if self._tries > self.ping_attempts:
@@ -189,8 +188,10 @@ class Session(SessionCore):
     def deadline(self, now: int) -> int:
         """Milliseconds from ``now`` until ``spin_once`` has something to do of its own accord."""
         left = _NEVER
-        if self.login or self.state == _LOST or self._ping:
-            left = 0 if self._due is None else ticks_diff(self._due, now)
+        if self._tries:
+            left = ticks_diff(self._due, now)
+        elif self.away:
+            left = 0
         elif self.keepalive:
             left = self.keepalive - ticks_diff(now, self._heard)
         if self.pending:
@@ -201,7 +202,7 @@ class Session(SessionCore):
 
     def deliver(self, buf: "Buffer", off: int, n: int) -> None:
         """Takes a message of the transport."""
-        if self.login and (n <= self.body or buf[off + self.body] != _STATUS_AGENT):
+        if self.away == _LOGIN and (n <= self.body or buf[off + self.body] != _STATUS_AGENT):
             return  # it is about the streams of the session that was
         if self.receive(buf, off, n, self.now):
             self._heard = self.now
@@ -298,7 +299,7 @@ def put(writer: Entity, message: "Outgoing", n: int) -> bool:
 def _turn(session: Session, now: int) -> None:
     """Does what the connection needs. When there is no room for the guide, there may be at the next turn."""
     try:
-        if session.guide is None and session.up and session.pending == 0 and session.foreign < _FOREIGN:
+        if session.guide is None and session.up and not session.pending:
             release()
             session.watch(now)
         else:

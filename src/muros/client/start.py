@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 _STREAM_RELIABLE = const(0x80)
 _FIRST_REQUEST = const(10)
+_LOGIN = const(1)  # how we are away, see ``link``
 
 
 def start(
@@ -52,10 +53,9 @@ def start(
     self.transport = transport
     self._deliver = self.deliver  # taking a method from its object costs a board memory each time
     self.request = _FIRST_REQUEST
-    self.login = True
+    self.away = _LOGIN
     self.up = False
-    self.state = self._heard = self._tries = self._ping = self.pending = self.laps = 0
-    self._due = None
+    self.state = self._tries = self._ping = self.pending = self.laps = 0
     self.attempt = b""
     self.drops = array("I", bytearray(20))
     self.entities = []

@@ -40,7 +40,7 @@ class Epoch:
         asked = False
         while left > 0:
             session.spin_once(ticks())
-            if not asked and session.up and not session.login:
+            if not asked and session.up and not session.away:
                 clock.request()
                 asked = True
             elif asked and clock._asked is None:

@@ -120,17 +120,17 @@ class Reach(Knowledge):
         """Follows an import, at the top of the module ``top`` as far as what it gives is used there or handed on."""
         place = node.module or "" if isinstance(node, ast.ImportFrom) else ""
         for one in node.names:
+            whole = f"{place}.{one.name}" if place else one.name
+            if top and whole in self._modules:
+                self._aliases[top, one.asname or one.name] = whole
             if top and not self.is_used(one, place, top):
                 continue
-            whole = f"{place}.{one.name}" if place else one.name
             parts = whole.split(".")
             for i in range(len(parts)):
                 if ".".join(parts[: i + 1]) in self._modules:
                     self.places.add(".".join(parts[: i + 1]))
             self._imported.add((place, one.name))
             self._sources.setdefault((self.place, one.asname or one.name), set()).add(place)
-            if top and whole in self._modules:
-                self._aliases[top, one.asname or one.name] = whole
             if not self.place:
                 self._names.add(one.name)
             if one.asname and one.asname != one.name:
