@@ -42,21 +42,39 @@ def accepted(session: "Session") -> None:
         session.keep().hold()
     reset(session)
     session.asked.clear()
-    session.pending = len(session.entities)
+    session.pending = 1
     for entity in session.entities:
         renew(entity)
 
 
 def go_through(session: "Session", now: int) -> None:
-    """Creates what is to be created."""
-    if session.asked and ticks_diff(now, session.late) >= 0:
-        session.asked.clear()
+    """Makes the requests that are not made yet, as far as there is room for them now."""
+    asked = session.asked
+    if asked and ticks_diff(now, session.late) >= 0:
+        asked.clear()
         session.laps += 1
         if session.laps == 3:
             session.problem(_PROBLEM_NO_ANSWER)
+    pending = 0
     for entity in session.entities:
-        if entity.todo & _STEPS and not _create(session, entity, now):
-            break
+        if entity.request == 0:  # that of step 0; the others come before it
+            steps = 4 if entity.todo >> _GROUP else 2
+            entity.request = session.number(steps) + steps - 1
+        for step in (_TOPIC, _GROUP, 1):
+            request = entity.request - step
+            if entity.todo >> step & 1 and request not in asked:
+                if len(asked) == _AT_ONCE or not submit(
+                    session, _CREATION, request, object_id(entity, step), variant(entity, step)
+                ):
+                    return
+                asked[request] = entity
+                session.late = ticks_add(now, session.creation_timeout)
+        if entity.todo == 1:
+            if not submit(session, _READING, entity.request, entity.id, _reading(entity)):
+                return
+            entity.todo = 0
+        pending |= entity.todo & _STEPS
+    session.pending = pending
 
 
 def status(session: "Session", request: int, number: int, status: int) -> None:
@@ -79,8 +97,6 @@ def status(session: "Session", request: int, number: int, status: int) -> None:
             entity.status = status
             entity.todo = _REFUSED
             session.problem(_PROBLEM_ENTITY, status, entity.name)
-        if not entity.todo & _STEPS:
-            session.pending -= 1
 
 
 def submit(session: "Session", kind: int, request: int, object_id: int, payload: bytes) -> bool:
@@ -93,28 +109,6 @@ def submit(session: "Session", kind: int, request: int, object_id: int, payload:
     if n > session.reliable.capacity:
         return session.keep().first(data)
     return (session.backlog is None or session.backlog.cutter is None) and add(session.reliable, data)
-
-
-def _create(session: "Session", entity: "Entity", now: int) -> bool:
-    """Makes the requests that are not made yet; False when there is no room for them now."""
-    if entity.request == 0:  # that of step 0; the others come before it
-        steps = 4 if entity.todo >> _GROUP else 2
-        entity.request = session.number(steps) + steps - 1
-    for step in (_TOPIC, _GROUP, 1):
-        request = entity.request - step
-        if entity.todo >> step & 1 and request not in session.asked:
-            if len(session.asked) == _AT_ONCE or not submit(
-                session, _CREATION, request, object_id(entity, step), variant(entity, step)
-            ):
-                return False
-            session.asked[request] = entity
-            session.late = ticks_add(now, session.creation_timeout)
-    if entity.todo == 1:
-        if not submit(session, _READING, entity.request, entity.id, _reading(entity)):
-            return False
-        entity.todo = 0
-        session.pending -= 1
-    return True
 
 
 def variant(entity: "Entity", step: int) -> "Any":

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 _DELETION = const(0x0103)  # a DELETE, little endian
 _TOPIC = const(3)
 _GROUP = const(2)
-_UNDONE = const(0x0F)
 _REFUSED = const(0x10)
 _PARENT_BITS = const(12)
 _STEPS = b"\0\2\0\0\0\x0e\x0f\3\3"  # by kind of object
@@ -54,8 +53,6 @@ def destroy(self: "Entity") -> None:
         return
     session.entities.remove(self)
     session.objects.pop(self.id, None)
-    if self.todo & _UNDONE:
-        session.pending -= 1
     self.todo = _REFUSED
     self.status = 1
     backlog = session.keep()
@@ -80,6 +77,6 @@ def read(
     """
     self.limits = (samples, seconds, bytes_per_second, pace)
     if self.todo == 0:
-        self.session.pending += 1
+        self.session.pending = 1
         self.request = 0
         self.todo = 1

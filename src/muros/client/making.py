@@ -143,4 +143,4 @@ def _add(made: Entity, session: "Session", name: str, kind: int) -> None:
     made.id = session.new_id(kind)
     renew(made)
     session.entities.append(made)
-    session.pending += 1
+    session.pending = 1

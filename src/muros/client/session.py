@@ -80,7 +80,7 @@ class Session(SessionCore):
         drops: "array[int]"
         objects: "dict[int, Any]"  # what takes DATA, by object id; what takes other submessages, by minus their kind
         entities: "list[Entity]"
-        pending: int  # entities that are not whole yet
+        pending: int  # not 0 while there may be entities that are not whole yet
         asked: "dict[int, Entity]"  # by the ids of requests that have no STATUS yet
         late: int  # the tick at which they are made again
         laps: int  # how often that was in vain
