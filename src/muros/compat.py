@@ -13,9 +13,9 @@ one of their classes does. With :func:`lending` an object has methods that live 
 is importing.
 """
 
-import sys
+from sys import implementation, modules
 
-MPY = sys.implementation.name == "micropython"
+MPY = implementation.name == "micropython"
 
 if MPY:
     from gc import collect
@@ -33,22 +33,22 @@ if MPY:
 
     def borrow(name):  # type: ignore[no-untyped-def]
         """A module, until ``release``."""
-        if name not in sys.modules:
+        if name not in modules:
             collect()
-            known = set(sys.modules)
+            known = set(modules)
             __import__(name)
-            for other in sys.modules:
+            for other in modules:
                 if other not in known and other.startswith("muros."):
                     loans.append(other)
-        return sys.modules[name]
+        return modules[name]
 
     def release():  # type: ignore[no-untyped-def]
         """Forgets what was borrowed."""
         while loans:
             name = loans.pop()
-            del sys.modules[name]
+            del modules[name]
             at = name.rfind(".")
-            delattr(sys.modules[name[:at]], name[at + 1 :])
+            delattr(modules[name[:at]], name[at + 1 :])
 
     def lend(owner, module, name):  # type: ignore[no-untyped-def]
         """``owner``'s method ``name``: a function of a borrowed module, which takes ``owner`` first."""

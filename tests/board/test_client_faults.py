@@ -94,7 +94,7 @@ def test_request_ids_wrap() -> None:
         lambda number, buf, off, n: None,
     )
     settle(board)
-    board.session.request = _LAST_REQUEST - 1
+    board.session.request = _LAST_REQUEST - 2
     numbers = []
     for _ in range(4):
         numbers.append(requester.send(Raw(b"1234")))

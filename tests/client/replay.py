@@ -250,7 +250,7 @@ class Puppet:
             elif kind == WRITE_DATA:
                 self.write(message[1], object_id, body[4:])
             elif kind == GET_INFO:
-                session.request, request = 10, session.request
+                session.request, request = 9, session.request
                 session.ask()
                 session.request = request
                 session._ping = 0

@@ -36,7 +36,7 @@ def test_every_request_id_may_be_the_first_of_an_entity() -> None:
     device = Device(world, qos="best_effort").connect()
     session = device.session
     for start in range(LAST_REQUEST - 6, LAST_REQUEST + 2):
-        session.request = start
+        session.request = start - 1
         device.writer.write_bytes(b"loose")
         made = session.reader(device.participant, "rt/more", STRING)
         device.reader.read(5)
@@ -80,7 +80,7 @@ def test_replies_have_the_numbers_of_their_requests_when_ids_wrap(queue: int) ->
     world.until(lambda: server.state == client.state == CONNECTED)
     world.run(50)
     sent = []
-    client.request = LAST_REQUEST - 2
+    client.request = LAST_REQUEST - 3
     for _ in range(6):
         if queue:
             client.keep()  # they go through the backlog

@@ -27,9 +27,9 @@ _FRAGMENT = const(13)
 _LASTING = b"\3\7"  # DELETE and WRITE_DATA: the rest is asked for anew
 _HEAD = const(4)
 
-_TOO_LARGE = const(6)  # codes of problems
-_OFFLINE = const(7)
-_FULL = const(8)
+_OFFLINE = const(0)  # causes of what is dropped, see ``methods``
+_FULL = const(1)
+_TOO_LARGE = const(2)
 
 
 class Backlog:

@@ -5,7 +5,7 @@ asked for again when none comes; creating twice does no harm, as REUSE and REPLA
 and left alone, the others go on. Rules of the wire: DDS-XRCE 1.0, clauses 7.8.3 and 7.8.5. Boards borrow this.
 """
 
-from muros.client.entities import UNLIMITED, object_id, renew
+from muros.client.entities import object_id, renew
 from muros.client.names import dds_type, topic_name
 from muros.compat import const, ticks_add, ticks_diff
 from muros.xrce import create as binary
@@ -30,6 +30,7 @@ _TOPIC = const(3)  # steps, see ``entities``
 _GROUP = const(2)
 _STEPS = const(0x0F)  # the bits of ``todo``: steps without a good STATUS, refused
 _REFUSED = const(0x10)
+_UNLIMITED = const(0xFFFF)
 
 _PROBLEM_ENTITY = const(3)
 _PROBLEM_READ = const(4)
@@ -38,7 +39,7 @@ _PROBLEM_NO_ANSWER = const(5)
 
 def accepted(session: "Session") -> None:
     """Begins the streams again and has every entity created."""
-    if session.reliable.first != session.reliable.next or session.backlog is not None:
+    if session.reliable.first != session.reliable.next or session.backlog:
         session.keep().hold()
     reset(session)
     session.asked.clear()
@@ -58,8 +59,7 @@ def go_through(session: "Session", now: int) -> None:
     pending = 0
     for entity in session.entities:
         if entity.request == 0:  # that of step 0; the others come before it
-            steps = 4 if entity.todo >> _GROUP else 2
-            entity.request = session.number(steps) + steps - 1
+            entity.request = session.number(4 if entity.todo >> _GROUP else 2)
         for step in (_TOPIC, _GROUP, 1):
             request = entity.request - step
             if entity.todo >> step & 1 and request not in asked:
@@ -108,38 +108,39 @@ def submit(session: "Session", kind: int, request: int, object_id: int, payload:
     data = head(kind, n, request, object_id) + payload
     if n > session.reliable.capacity:
         return session.keep().first(data)
-    return (session.backlog is None or session.backlog.cutter is None) and add(session.reliable, data)
+    return not (session.backlog and session.backlog.cutter) and add(session.reliable, data)
 
 
 def variant(entity: "Entity", step: int) -> "Any":
     """The representation of an object, as bytes."""
     create: "Any" = entity.session.create or binary
+    name = entity.name
     kind = entity.id & 15
     if kind == _KIND_PARTICIPANT:
-        return create.participant(entity.name, entity.domain)
-    parent = (entity.above & (1 << _PARENT_BITS) - 1) << 4 | _KIND_PARTICIPANT
+        return create.participant(name, entity.domain)
+    above = entity.above
+    parent = (above & (1 << _PARENT_BITS) - 1) << 4 | _KIND_PARTICIPANT
+    type_name = entity.type_name
     if hasattr(entity, "room"):  # a side of a service
         return create.service(
             kind,
-            entity.name,
-            dds_type(entity.type_name, "_Request"),
-            dds_type(entity.type_name, "_Response"),
-            topic_name("rq", entity.name, "Request"),
-            topic_name("rr", entity.name, "Reply"),
+            name,
+            dds_type(type_name, "_Request"),
+            dds_type(type_name, "_Response"),
+            topic_name("rq", name, "Request"),
+            topic_name("rr", name, "Reply"),
             parent,
         )
-    type_name = dds_type(entity.type_name)
+    type_name = dds_type(type_name)
     if step == _TOPIC:
-        return create.topic(entity.name, type_name, parent)
+        return create.topic(name, type_name, parent)
     if step == _GROUP:
         return create.group(kind - 2, parent)
-    return create.endpoint(
-        kind, entity.above >> _PARENT_BITS, entity.qos, entity.id - 2, entity.name, type_name
-    )
+    return create.endpoint(kind, above >> _PARENT_BITS, entity.qos, entity.id - 2, name, type_name)
 
 
 def _reading(entity: "Entity") -> bytes:
     """The read specification: by default everything, for ever."""
     stream_id = _STREAM_RELIABLE if entity.qos[0] & _QOS_RELIABLE else _STREAM_BEST_EFFORT
-    samples, seconds, rate, pace = getattr(entity, "limits", (UNLIMITED, 0, 0, 0))
+    samples, seconds, rate, pace = getattr(entity, "limits", (_UNLIMITED, 0, 0, 0))
     return binary.read_data(stream_id, samples, seconds, rate, pace)

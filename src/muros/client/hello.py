@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from muros.client.session import Session
 
 _SESSION_NONE = const(0x80)
+_CREATE_CLIENT = const(0x0100)  # little endian
+_ONE = b"\1\0\0\1\0\0\0"  # so many properties follow
+_TWO = b"\1\0\0\2\0\0\0"
 _LIVELINESS = b"\7\0\0\0uxr_hl\0\0\7\0\0\0%06d\0\0"  # a property, padded for whatever follows
 _ATTEMPT = b"\x09\0\0\0muros_id\0\0\0\0\x09\0\0\0%02x%02x%02x%02x\0\0"
 
@@ -23,17 +26,14 @@ def hello(session: "Session") -> bytes:
     With ``properties`` the attempt becomes the property ``muros_id``, by which an agent tells a repetition from a new
     beginning. ``hard_liveliness`` in ms, up to 999999, becomes the property ``uxr_hl``.
     """
-    properties = []
+    head = session.head
+    body = b"XRCE\1\0\1\x0f" + session.key + head[:1]
     if session.hard_liveliness:
-        properties.append(_LIVELINESS % session.hard_liveliness)
+        body += (_TWO if session.properties else _ONE) + _LIVELINESS % session.hard_liveliness
+    else:
+        body += _ONE if session.properties else b"\0"
     if session.properties:
         session.attempt = session.attempt or draw(4)
-        properties.append(_ATTEMPT % tuple(session.attempt))
-    body = b"XRCE\1\0\1\x0f" + session.key + session.head[:1]
-    if properties:
-        body += b"\1\0\0" + pack("<I", len(properties)) + b"".join(properties)
-    else:
-        body += b"\0"
+        body += _ATTEMPT % tuple(session.attempt)
     body += pack("<H", session.reliable.mtu)
-    head = b"\x80\0\0\0" if session.head[0] >= _SESSION_NONE else b"\0\0\0\0" + session.key
-    return head + pack("<BBH", 0, 1, len(body)) + body
+    return pack("<I", head[0] & _SESSION_NONE) + head[4:] + pack("<HH", _CREATE_CLIENT, len(body)) + body

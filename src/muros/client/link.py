@@ -112,7 +112,7 @@ def answer(session: "Session", kind: int, buf: "Buffer", off: int, n: int) -> No
             pack_into(">HHI", session._control, _PAYLOAD, request, number, 0)
             control(session, _INFO, 8)
         elif kind == _INFO:
-            if session._ping and request == session._ping:
+            if request and request == session._ping:
                 happened(session, _KNOWN if buf[off + 5] else _UNKNOWN)
         elif kind == _STATUS:
             if number == _OBJECT_CLIENT:

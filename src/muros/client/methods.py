@@ -19,12 +19,11 @@ if TYPE_CHECKING:
 _STREAM_BEST_EFFORT = const(0x01)
 _CONNECTED = const(2)
 _HEAD = const(4)
-_TOO_LARGE = const(6)  # codes of problems
-_OFFLINE = const(7)
-_FULL = const(8)
+_OFFLINE = const(0)  # causes, as they are counted in ``drops``
+_FULL = const(1)
+_LARGEST = const(4)
+_CODES = const(0xA0687)  # what problems they are, one digit for each, that of cause 0 last
 _UNREACHABLE = const(9)
-_LARGEST = const(10)
-_CAUSES = b"\2\0\1\0\4"  # where they are counted in ``drops``
 
 
 def ping(self: "Session", timeout: int = 1000, clock: "Callable[[], int]" = ticks_ms) -> bool:
@@ -49,14 +48,14 @@ def make_input(self: "Session", stream_id: int) -> "Input | None":
 
 def keep(self: "Session") -> "Backlog":
     """The backlog, made at the first need."""
-    if self.backlog is None:
+    if not self.backlog:
         self.backlog = borrow("muros.client.backlog").Backlog(self)
     return self.backlog
 
 
 def defer(self: "Session", writer: "Any", message: "Outgoing", n: int) -> bool:
     """What becomes of a sample that cannot go out now: it is queued, cut up, or refused and counted."""
-    if self.queue == 0 and self.backlog is None:
+    if not (self.queue or self.backlog):
         if self.state != _CONNECTED or writer.todo:
             return dropped(self, _OFFLINE, n, writer)
         if n + _HEAD <= writer.stream.capacity:
@@ -64,13 +63,12 @@ def defer(self: "Session", writer: "Any", message: "Outgoing", n: int) -> bool:
     return keep(self).defer(writer, message, n)
 
 
-def dropped(self: "Session", code: int, n: int, what: "object" = "") -> bool:
+def dropped(self: "Session", cause: int, n: int, what: "object" = "") -> bool:
     """Counts a sample of ``n`` bytes in ``drops``, and tells ``on_problem``. False, as it was not taken."""
-    cause = _CAUSES[code - _TOO_LARGE]
     count = self.drops[cause] + 1
     self.drops[cause] = count
     if count & count - 1 == 0:  # the 1st, 2nd, 4th, 8th...: never a flood
-        self.problem(code, n, what)
+        self.problem(_CODES >> 4 * cause & 15, n, what)
     return False
 
 

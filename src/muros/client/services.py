@@ -48,7 +48,7 @@ class Requester(Service):
 
     def send(self, request: "Message") -> int:
         """Sends a request; its number, or 0 when it was not taken."""
-        return self.session.request - 1 if self.publish(request) else 0
+        return self.session.request if self.publish(request) else 0
 
     def deliver(self, buf: "Buffer", off: int, n: int) -> None:
         """Takes a reply."""

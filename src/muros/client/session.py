@@ -12,7 +12,6 @@ from muros.xrce.session import SessionCore, control, flush
 
 TYPE_CHECKING = const(0)
 if TYPE_CHECKING:
-    from array import array
     from collections.abc import Callable
     from typing import Any
 
@@ -34,6 +33,7 @@ _DATA = const(9)
 _TIMESTAMP_REPLY = const(15)
 _OBJECT_AGENT = const(0xFFFD)
 _FIRST_REQUEST = const(10)
+_LAST_REQUEST = const(0xFFFE)
 _PAYLOAD = const(12)  # where that of a control message lies
 _NEVER = const(5000)
 
@@ -73,18 +73,18 @@ class Session(SessionCore):
     if TYPE_CHECKING:
         transport: "Transport"
         state: int
-        request: int  # behind the request id that was used last
+        request: int  # the request id that was used last
         away: int  # 0 while the agent knows us; 1: it has yet to accept us; 2: it fell silent
         up: bool  # the transport is open
         reliable: "Output"
-        drops: "array[int]"
+        drops: "list[int]"
         objects: "dict[int, Any]"  # what takes DATA, by object id; what takes other submessages, by minus their kind
         entities: "list[Entity]"
         pending: int  # not 0 while there may be entities that are not whole yet
         asked: "dict[int, Entity]"  # by the ids of requests that have no STATUS yet
         late: int  # the tick at which they are made again
         laps: int  # how often that was in vain
-        counts: "array[int]"  # the next index for each kind of object
+        counts: "list[int]"  # the next index for each kind of object
         key: bytes
         attempt: bytes  # what names the attempt to connect, empty until it is made
         suspected: int  # the tick since which the agent seems to be out of step
@@ -136,17 +136,18 @@ class Session(SessionCore):
         taken = _receive(self) if self.up else 0
         _turn(self, now)
         if not self.away:
-            if self.backlog is not None:
+            if self.backlog:
                 self.backlog.pump()
             flush(self, self.reliable, now)
-        if self.raised is not None:
-            raised, self.raised = self.raised, None
+        raised = self.raised
+        if raised is not None:
+            self.raised = None
             raise raised
         return taken
 
     def lead(self) -> "Any":
         """The guide, from now on until everything is steady."""
-        if self.guide is None:
+        if not self.guide:
             release()
             self.guide = borrow("muros.client.link")
         return self.guide
@@ -155,7 +156,7 @@ class Session(SessionCore):
         """Asks whether the agent is there, after a silence."""
         if self.keepalive == 0 or ticks_diff(now, self._heard) < self.keepalive:
             self._ping = self._tries = 0
-        elif self._tries == 0 or ticks_diff(now, self._due) >= 0:
+        elif not self._tries or ticks_diff(now, self._due) >= 0:
             self._due = ticks_add(now, self.ping_timeout)
             self._tries += 1
             if self._tries > self.ping_attempts:
@@ -165,17 +166,17 @@ class Session(SessionCore):
 
     def ask(self) -> None:
         """Asks the agent whether it knows the session."""
-        if self._ping == 0:
+        if not self._ping:
             self._ping = self.number()
         pack_into(">HHI", self._control, _PAYLOAD, self._ping, _OBJECT_AGENT, 0x02000000)
         control(self, _GET_INFO, 8)
 
     def number(self, count: int = 1) -> int:
-        """A request id, the first of ``count`` in a row."""
-        request = self.request
-        if request + count > 0xFFFF:
-            request = _FIRST_REQUEST
-        self.request = request + count
+        """A request id, the last of ``count`` in a row."""
+        request = self.request + count
+        if request > _LAST_REQUEST:
+            request = _FIRST_REQUEST - 1 + count
+        self.request = request
         return request
 
     def wait(self, timeout: int) -> None:
@@ -220,7 +221,7 @@ class Session(SessionCore):
                 taker = self.objects.get(-kind)
                 if taker is not None:
                     taker(buf, off, n)
-                if kind == _INFO and self.guide is None and n >= 6 and buf[off + 5]:
+                if kind == _INFO and not self.guide and n >= 6 and buf[off + 5]:
                     pass  # the agent is there, as we thought
                 elif kind != _TIMESTAMP_REPLY:
                     self.lead().answer(self, kind, buf, off, n)
@@ -269,12 +270,7 @@ class Entity:
         """
         session = self.session
         n = message.size()
-        if (
-            self.todo == 0
-            and session.state == _CONNECTED
-            and session.backlog is None
-            and put(self, message, n)
-        ):
+        if not self.todo and session.state == _CONNECTED and not session.backlog and put(self, message, n):
             return True
         return session.defer(self, message, n)
 
@@ -299,7 +295,7 @@ def put(writer: Entity, message: "Outgoing", n: int) -> bool:
 def _turn(session: Session, now: int) -> None:
     """Does what the connection needs. When there is no room for the guide, there may be at the next turn."""
     try:
-        if session.guide is None and session.up and not session.pending:
+        if session.up and not (session.guide or session.pending):
             release()
             session.watch(now)
         else:

@@ -1,7 +1,5 @@
 """How a session is made: its settings, its streams, its buffers. Boards borrow this."""
 
-from array import array
-
 from muros.client.chance import draw
 from muros.compat import MPY, const
 from muros.xrce.beginning import begin, make_input, make_output
@@ -39,10 +37,10 @@ def start(
 ) -> None:
     """Sets up a session; arguments as for ``Session``."""
     if client_key is None:
-        client_key = draw(3) + bytes((draw(1)[0] | 1,))
-    elif isinstance(client_key, int):
+        client_key = int.from_bytes(draw(4), "big") | 1
+    if isinstance(client_key, int):
         client_key = client_key.to_bytes(4, "big")
-    if len(client_key) != 4 or client_key == b"\0\0\0\0":
+    if len(client_key) != 4 or client_key == bytes(4):
         raise ValueError("client_key must be 4 bytes or an integer from 1 to 0xFFFFFFFF")
     mtu = (mtu or transport.mtu) - 4
     # what lasts comes before what is made on the way
@@ -52,16 +50,16 @@ def start(
     self.inputs[_STREAM_RELIABLE] = make_input(_STREAM_RELIABLE, mtu, history)
     self.transport = transport
     self._deliver = self.deliver  # taking a method from its object costs a board memory each time
-    self.request = _FIRST_REQUEST
+    self.request = _FIRST_REQUEST - 1
     self.away = _LOGIN
     self.up = False
     self.state = self._tries = self._ping = self.pending = self.laps = 0
     self.attempt = b""
-    self.drops = array("I", bytearray(20))
+    self.drops = [0] * 5
     self.entities = []
     self.objects = {}
     self.asked = {}
-    self.counts = array("H", bytearray(18))
+    self.counts = [0] * 9
     self.key = client_key
     self.queue = queue
     self.keepalive = keepalive

@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from muros.rclc.let import Task
 
 _CONNECTED = const(2)
-_OFFLINE = const(7)  # codes of problems
-_FULL = const(8)
+_OFFLINE = const(0)  # causes of what is dropped, see ``muros.client.methods``
+_FULL = const(1)
 _WRITE = const(0x0107)  # a WRITE_DATA, little endian
 _HEAD = const(8)  # of a WRITE_DATA
 
