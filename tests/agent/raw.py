@@ -219,32 +219,32 @@ class Raw:
     ) -> "Raw":
         """Makes a participant, a topic, a publisher with a writer and a subscriber with a reader."""
         self.base(topic, type_name, name)
-        assert self.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER)) == 0
-        assert self.make(READER, create.endpoint(KIND_DATAREADER, TOPIC, qos, SUBSCRIBER)) == 0
+        assert self.make(WRITER, create.of_endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER)) == 0
+        assert self.make(READER, create.of_endpoint(KIND_DATAREADER, TOPIC, qos, SUBSCRIBER)) == 0
         return self
 
     def base(self, topic: str = "rt/chatter", type_name: str = "T", name: str = "node") -> "Raw":
         """Connects and makes everything but the endpoints."""
         assert self.connect() == 0
-        assert self.make(PARTICIPANT, create.participant(name, 0)) == 0
-        assert self.make(TOPIC, create.topic(topic, type_name, PARTICIPANT)) == 0
-        assert self.make(PUBLISHER, create.group(KIND_PUBLISHER, PARTICIPANT)) == 0
-        assert self.make(SUBSCRIBER, create.group(KIND_SUBSCRIBER, PARTICIPANT)) == 0
+        assert self.make(PARTICIPANT, create.of_participant(name, 0)) == 0
+        assert self.make(TOPIC, create.of_topic(topic, type_name, PARTICIPANT)) == 0
+        assert self.make(PUBLISHER, create.of_group(KIND_PUBLISHER, PARTICIPANT)) == 0
+        assert self.make(SUBSCRIBER, create.of_group(KIND_SUBSCRIBER, PARTICIPANT)) == 0
         return self
 
     def service(self, kind: int, name: str = "/add", domain: int = 0) -> "Raw":
         """Connects and makes a participant with a requester or a replier."""
         assert kind in (KIND_REQUESTER, KIND_REPLIER)
         assert self.connect() == 0
-        assert self.make(PARTICIPANT, create.participant("node", domain)) == 0
-        variant = create.service(kind, name, "Q", "P", f"rq{name}Request", f"rr{name}Reply", PARTICIPANT)
+        assert self.make(PARTICIPANT, create.of_participant("node", domain)) == 0
+        variant = create.of_service(kind, name, "Q", "P", f"rq{name}Request", f"rr{name}Reply", PARTICIPANT)
         assert self.make(0x10 | kind, variant, REUSE | REPLACE) == 0
         return self
 
     def service_kinds(self) -> None:
         """Makes a requester and a replier in the participant that is there."""
         for kind in (KIND_REQUESTER, KIND_REPLIER):
-            variant = create.service(kind, "/x", "Q", "P", "rq/xRequest", "rr/xReply", PARTICIPANT)
+            variant = create.of_service(kind, "/x", "Q", "P", "rq/xRequest", "rr/xReply", PARTICIPANT)
             assert self.make(0x10 | kind, variant) == 0
 
     # What the agent sent

@@ -79,7 +79,9 @@ def many_entities(bench: Bench, dice: random.Random) -> Iterator[bytes]:
     number = 0
     while True:
         ids = struct.pack(">HH", number & 0xFFFF, (number & 0xFFF) << 4 | 1)
-        yield own.message(0x80, number, submessage(1, ids + create.participant(f"m{number}", 0), REUSE | 1))
+        yield own.message(
+            0x80, number, submessage(1, ids + create.of_participant(f"m{number}", 0), REUSE | 1)
+        )
         number += 1
 
 
@@ -312,7 +314,7 @@ def test_a_participant_of_the_same_key_is_made_again_while_old_endpoints_live() 
     bench = Bench()
     client = Raw(bench).tree()
     assert client.delete(PARTICIPANT) == STATUS_OK
-    assert client.make(PARTICIPANT, create.participant("again", 0)) == STATUS_OK
+    assert client.make(PARTICIPANT, create.of_participant("again", 0)) == STATUS_OK
     client.read()
     client.write(b"old endpoints live on")
     assert client.samples() == [b"old endpoints live on"]

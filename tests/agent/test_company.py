@@ -179,6 +179,6 @@ def test_a_board_that_leaves_the_domain_to_the_agent_gets_the_computers() -> Non
     bench = Bench(url="local:42")
     client = Raw(bench)
     assert client.connect() == 0
-    assert client.make(PARTICIPANT, create.participant("node", 255)) == 0
+    assert client.make(PARTICIPANT, create.of_participant("node", 255)) == 0
     assert [each.domain for each in bench.space.graph.participants] == [42]
     assert bench.findings.snapshot() == ()

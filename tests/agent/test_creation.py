@@ -52,29 +52,33 @@ OTHER_TOPIC = 0x0022
 
 
 def service(kind: int, name: str) -> bytes:
-    return create.service(kind, name, "Q", "P", f"rq{name}Request", f"rr{name}Reply", PARTICIPANT)
+    return create.of_service(kind, name, "Q", "P", f"rq{name}Request", f"rr{name}Reply", PARTICIPANT)
 
 
 # (object id, one description, another): every kind that is made
 KINDS = {
-    "participant": (PARTICIPANT, create.participant("node", 0), create.participant("other", 0)),
-    "participant's domain": (PARTICIPANT, create.participant("node", 0), create.participant("node", 1)),
-    "topic": (TOPIC, create.topic("rt/chatter", "T", PARTICIPANT), create.topic("rt/other", "T", PARTICIPANT)),
-    "topic's type": (TOPIC, create.topic("rt/chatter", "T", PARTICIPANT), create.topic("rt/chatter", "U", PARTICIPANT)),
+    "participant": (PARTICIPANT, create.of_participant("node", 0), create.of_participant("other", 0)),
+    "participant's domain": (PARTICIPANT, create.of_participant("node", 0), create.of_participant("node", 1)),
+    "topic": (TOPIC, create.of_topic("rt/chatter", "T", PARTICIPANT), create.of_topic("rt/other", "T", PARTICIPANT)),
+    "topic's type": (
+        TOPIC,
+        create.of_topic("rt/chatter", "T", PARTICIPANT),
+        create.of_topic("rt/chatter", "U", PARTICIPANT),
+    ),
     "datawriter": (
         WRITER,
-        create.endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER),
-        create.endpoint(KIND_DATAWRITER, TOPIC, BEST_EFFORT, PUBLISHER),
+        create.of_endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER),
+        create.of_endpoint(KIND_DATAWRITER, TOPIC, BEST_EFFORT, PUBLISHER),
     ),
     "datawriter's topic": (
         WRITER,
-        create.endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER),
-        create.endpoint(KIND_DATAWRITER, OTHER_TOPIC, RELIABLE, PUBLISHER),
+        create.of_endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER),
+        create.of_endpoint(KIND_DATAWRITER, OTHER_TOPIC, RELIABLE, PUBLISHER),
     ),
     "datareader": (
         READER,
-        create.endpoint(KIND_DATAREADER, TOPIC, RELIABLE, SUBSCRIBER),
-        create.endpoint(KIND_DATAREADER, TOPIC, BEST_EFFORT, SUBSCRIBER),
+        create.of_endpoint(KIND_DATAREADER, TOPIC, RELIABLE, SUBSCRIBER),
+        create.of_endpoint(KIND_DATAREADER, TOPIC, BEST_EFFORT, SUBSCRIBER),
     ),
     "requester": (REQUESTER, service(KIND_REQUESTER, "/add"), service(KIND_REQUESTER, "/sub")),
     "replier": (REPLIER, service(KIND_REPLIER, "/add"), service(KIND_REPLIER, "/sub")),
@@ -86,7 +90,7 @@ def test_modes_of_every_kind(kind: str) -> None:
     """The table of DDS-XRCE 1.0, 7.8.3.1, as the reference agent keeps to it."""
     bench = Bench()
     client = Raw(bench).tree()
-    client.make(OTHER_TOPIC, create.topic("rt/second", "T", PARTICIPANT))
+    client.make(OTHER_TOPIC, create.of_topic("rt/second", "T", PARTICIPANT))
     client.service_kinds()
     object_id, first, second = KINDS[kind]
     client.delete(object_id)
@@ -115,7 +119,7 @@ def test_modes_of_groups(object_id: int) -> None:
     """Publishers and subscribers are all alike."""
     bench = Bench()
     client = Raw(bench).tree()
-    variant = create.group(object_id & 15, PARTICIPANT)
+    variant = create.of_group(object_id & 15, PARTICIPANT)
     assert client.make(object_id, variant, 0) == STATUS_ERR_ALREADY_EXISTS
     assert client.make(object_id, variant, REUSE) == STATUS_OK_MATCHED
     assert client.make(object_id, variant, REPLACE) == STATUS_OK
@@ -130,7 +134,7 @@ def test_the_stream_of_the_answer(stream: int) -> None:
     client = Raw(bench)
     client.connect()
     ids = client.ids(PARTICIPANT)
-    client.send(stream, submessage(1, ids + create.participant("n", 0)))
+    client.send(stream, submessage(1, ids + create.of_participant("n", 0)))
     answers = [(got.stream, got.status) for got in client.got() if got.kind == 5]
     assert answers == [(STREAM_RELIABLE if stream >= 0x80 else STREAM_BEST_EFFORT, STATUS_OK)]
 
@@ -139,7 +143,7 @@ def test_the_kind_of_the_representation_wins_over_the_id() -> None:
     bench = Bench()
     client = Raw(bench)
     client.connect()
-    assert client.make(0x0000, create.participant("n", 0)) == STATUS_OK
+    assert client.make(0x0000, create.of_participant("n", 0)) == STATUS_OK
     assert list(bench.core.clients[client.key].objects) == [0x0001]
     assert client.delete(0x0000) == STATUS_ERR_UNKNOWN_REFERENCE
     assert client.delete(0x0001) == STATUS_OK
@@ -158,11 +162,11 @@ def test_kinds_that_are_taken_and_not_made(kind: Kind) -> None:
 @pytest.mark.parametrize(
     ("object_id", "variant", "status"),
     [
-        (TOPIC, create.topic("t", "T", 0x0991), STATUS_ERR_UNKNOWN_REFERENCE),
-        (PUBLISHER, create.group(KIND_PUBLISHER, 0x0991), STATUS_ERR_UNKNOWN_REFERENCE),
-        (WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, 0x0993), STATUS_ERR_UNKNOWN_REFERENCE),
-        (WRITER, create.endpoint(KIND_DATAWRITER, 0x0992, RELIABLE, PUBLISHER), STATUS_ERR_DDS_ERROR),
-        (READER, create.endpoint(KIND_DATAREADER, 0x0992, RELIABLE, SUBSCRIBER), STATUS_ERR_DDS_ERROR),
+        (TOPIC, create.of_topic("t", "T", 0x0991), STATUS_ERR_UNKNOWN_REFERENCE),
+        (PUBLISHER, create.of_group(KIND_PUBLISHER, 0x0991), STATUS_ERR_UNKNOWN_REFERENCE),
+        (WRITER, create.of_endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, 0x0993), STATUS_ERR_UNKNOWN_REFERENCE),
+        (WRITER, create.of_endpoint(KIND_DATAWRITER, 0x0992, RELIABLE, PUBLISHER), STATUS_ERR_DDS_ERROR),
+        (READER, create.of_endpoint(KIND_DATAREADER, 0x0992, RELIABLE, SUBSCRIBER), STATUS_ERR_DDS_ERROR),
         (WRITER, b"\x05\x03\0\0\xff\0\0\0", STATUS_ERR_INVALID_DATA),
         (WRITER, b"\x99\x03\0\0\xff\0\0\0", STATUS_ERR_INVALID_DATA),
     ],
@@ -183,9 +187,9 @@ def test_too_many_entities() -> None:
     bench = Bench(max_objects=6)
     client = Raw(bench).base()
     for n in range(2, 4):
-        assert client.make(n << 4 | 2, create.topic(f"t{n}", "T", PARTICIPANT)) == STATUS_OK
-    assert client.make(0x42, create.topic("t4", "T", PARTICIPANT)) == STATUS_ERR_RESOURCES
-    assert client.make(0x32, create.topic("again", "T", PARTICIPANT), REPLACE) == STATUS_OK
+        assert client.make(n << 4 | 2, create.of_topic(f"t{n}", "T", PARTICIPANT)) == STATUS_OK
+    assert client.make(0x42, create.of_topic("t4", "T", PARTICIPANT)) == STATUS_ERR_RESOURCES
+    assert client.make(0x32, create.of_topic("again", "T", PARTICIPANT), REPLACE) == STATUS_OK
     assert "max_objects" in bench.findings.snapshot()[-1].remedy
 
 
@@ -198,12 +202,14 @@ def test_recorded_statuses_of_edge_cases() -> None:
     bench = Bench()
     client = Raw(bench).base()
     both = REUSE | REPLACE
-    talker, other = create.participant("talker", 0), create.participant("other", 0)
+    talker, other = create.of_participant("talker", 0), create.of_participant("other", 0)
     given = {
         "bin datawriter unknown topic": [
-            client.make(WRITER, create.endpoint(KIND_DATAWRITER, 0x0992, RELIABLE, PUBLISHER), both)
+            client.make(WRITER, create.of_endpoint(KIND_DATAWRITER, 0x0992, RELIABLE, PUBLISHER), both)
         ],
-        "bin publisher unknown participant": [client.make(0x23, create.group(KIND_PUBLISHER, 0x0991), both)],
+        "bin publisher unknown participant": [
+            client.make(0x23, create.of_group(KIND_PUBLISHER, 0x0991), both)
+        ],
         "again participant identical talker": [
             client.make(0x21, talker, both),
             client.make(0x21, talker, both),
@@ -229,11 +235,11 @@ def test_domain_255_is_the_agents_choice(default: int) -> None:
     bench.core.default_domain = default
     client = Raw(bench)
     client.connect()
-    assert client.make(PARTICIPANT, create.participant("n", 255)) == STATUS_OK
+    assert client.make(PARTICIPANT, create.of_participant("n", 255)) == STATUS_OK
     assert [one.domain for one in bench.space.graph.participants] == [default]
-    assert client.make(PARTICIPANT, create.participant("n", 255), REUSE) == STATUS_OK_MATCHED
-    assert client.make(PARTICIPANT, create.participant("n", default), REUSE) == STATUS_OK_MATCHED
-    assert client.make(PARTICIPANT, create.participant("n", 9), REUSE) == STATUS_ERR_MISMATCH
+    assert client.make(PARTICIPANT, create.of_participant("n", 255), REUSE) == STATUS_OK_MATCHED
+    assert client.make(PARTICIPANT, create.of_participant("n", default), REUSE) == STATUS_OK_MATCHED
+    assert client.make(PARTICIPANT, create.of_participant("n", 9), REUSE) == STATUS_ERR_MISMATCH
 
 
 def test_domains_are_worlds_of_their_own() -> None:
@@ -242,12 +248,12 @@ def test_domains_are_worlds_of_their_own() -> None:
     for domain in (0, 1):
         client = Raw(bench, f"c{domain}", 1 + domain)
         client.connect()
-        client.make(PARTICIPANT, create.participant("n", domain))
-        client.make(TOPIC, create.topic("rt/a", "T", PARTICIPANT))
-        client.make(PUBLISHER, create.group(KIND_PUBLISHER, PARTICIPANT))
-        client.make(SUBSCRIBER, create.group(KIND_SUBSCRIBER, PARTICIPANT))
-        client.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER))
-        client.make(READER, create.endpoint(KIND_DATAREADER, TOPIC, RELIABLE, SUBSCRIBER))
+        client.make(PARTICIPANT, create.of_participant("n", domain))
+        client.make(TOPIC, create.of_topic("rt/a", "T", PARTICIPANT))
+        client.make(PUBLISHER, create.of_group(KIND_PUBLISHER, PARTICIPANT))
+        client.make(SUBSCRIBER, create.of_group(KIND_SUBSCRIBER, PARTICIPANT))
+        client.make(WRITER, create.of_endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER))
+        client.make(READER, create.of_endpoint(KIND_DATAREADER, TOPIC, RELIABLE, SUBSCRIBER))
         client.read()
         clients.append(client)
     clients[0].write(b"zero")
@@ -464,8 +470,8 @@ def test_a_service_meets_the_space() -> None:
 def test_qos_in_binary_reaches_the_space(qos: tuple[int, int, int, int], words: str) -> None:
     bench = Bench()
     client = Raw(bench).base()
-    assert client.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER)) == STATUS_OK
-    assert client.make(READER, create.endpoint(KIND_DATAREADER, TOPIC, qos, SUBSCRIBER)) == STATUS_OK
+    assert client.make(WRITER, create.of_endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER)) == STATUS_OK
+    assert client.make(READER, create.of_endpoint(KIND_DATAREADER, TOPIC, qos, SUBSCRIBER)) == STATUS_OK
     (writer,), (reader,) = bench.space.graph.writers, bench.space.graph.readers
     assert str(writer.qos) == words
     assert str(reader.qos) == words
@@ -497,11 +503,11 @@ def test_a_late_reader_gets_what_was_kept_for_it() -> None:
     bench = Bench()
     qos = Qos(depth=3, durability="transient_local").asked
     writer = Raw(bench, "w", 1).base()
-    writer.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER))
+    writer.make(WRITER, create.of_endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER))
     for n in range(5):
         writer.write(bytes((n,)))
     reader = Raw(bench, "r", 2).base()
-    reader.make(READER, create.endpoint(KIND_DATAREADER, TOPIC, qos, SUBSCRIBER))
+    reader.make(READER, create.of_endpoint(KIND_DATAREADER, TOPIC, qos, SUBSCRIBER))
     reader.read()
     assert reader.samples() == [bytes((n,)) for n in range(2, 5)]
 
@@ -517,7 +523,7 @@ def test_children_live_on_when_their_parents_go() -> None:
         assert client.delete(object_id) == STATUS_OK
     client.write(b"orphans")
     assert client.samples() == [b"orphans"]
-    assert client.make(0x25, create.endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER)) == (
+    assert client.make(0x25, create.of_endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER)) == (
         STATUS_ERR_UNKNOWN_REFERENCE
     )
     assert client.delete(WRITER) == STATUS_OK
@@ -530,10 +536,10 @@ def test_a_publisher_outlives_its_participant_and_makes_nothing_any_more() -> No
     bench = Bench()
     client = Raw(bench).base()
     assert client.delete(PARTICIPANT) == STATUS_OK
-    assert client.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER)) == (
+    assert client.make(WRITER, create.of_endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER)) == (
         STATUS_ERR_DDS_ERROR
     )
-    assert client.make(READER, create.endpoint(KIND_DATAREADER, TOPIC, RELIABLE, SUBSCRIBER)) == (
+    assert client.make(READER, create.of_endpoint(KIND_DATAREADER, TOPIC, RELIABLE, SUBSCRIBER)) == (
         STATUS_ERR_DDS_ERROR
     )
     assert not bench.space.graph.participants

@@ -125,15 +125,15 @@ ids = st.binary(min_size=4, max_size=4) | st.tuples(
 ).map(lambda t: struct.pack(">HH", t[0], t[1] << 4 | t[2]))
 variants = st.sampled_from(
     [
-        create.participant("n", 0),
-        create.participant("m", 255),
-        create.topic("rt/a", "T", PARTICIPANT),
-        create.group(3, PARTICIPANT),
-        create.group(4, PARTICIPANT),
-        create.endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER),
-        create.endpoint(KIND_DATAREADER, TOPIC, RELIABLE, SUBSCRIBER),
-        create.service(7, "/s", "Q", "P", "rq/s", "rr/s", PARTICIPANT),
-        create.service(8, "/s", "Q", "P", "rq/s", "rr/s", PARTICIPANT),
+        create.of_participant("n", 0),
+        create.of_participant("m", 255),
+        create.of_topic("rt/a", "T", PARTICIPANT),
+        create.of_group(3, PARTICIPANT),
+        create.of_group(4, PARTICIPANT),
+        create.of_endpoint(KIND_DATAWRITER, TOPIC, RELIABLE, PUBLISHER),
+        create.of_endpoint(KIND_DATAREADER, TOPIC, RELIABLE, SUBSCRIBER),
+        create.of_service(7, "/s", "Q", "P", "rq/s", "rr/s", PARTICIPANT),
+        create.of_service(8, "/s", "Q", "P", "rq/s", "rr/s", PARTICIPANT),
     ]
 )
 numbers = st.integers(0, 20) | st.integers(0, 0xFFFF)

@@ -190,7 +190,7 @@ def test_what_follows_a_goodbye_in_its_message_makes_nothing() -> None:
         client.send(
             stream,
             submessage(3, b"\0\2\xff\xfe"),
-            submessage(1, client.ids(PARTICIPANT) + create.participant("ghost", 0)),
+            submessage(1, client.ids(PARTICIPANT) + create.of_participant("ghost", 0)),
             submessage(2, b"\0\x0a\xff\xfd\1\0\0\0"),
         )
         assert in_space(bench) == (0, 0, 0)
@@ -299,7 +299,7 @@ def test_no_status_is_lost_with_a_full_window() -> None:
     for _ in range(100):
         ids = client.ids(PARTICIPANT)
         asked.append(ids)
-        client.send(STREAM_RELIABLE, submessage(1, ids + create.participant("n", 0), REUSE | 1))
+        client.send(STREAM_RELIABLE, submessage(1, ids + create.of_participant("n", 0), REUSE | 1))
     assert len([got for got in client.got() if got.kind == 5]) == 16
     client.acknowledges = True
     client.acknack(16)
@@ -509,8 +509,8 @@ def test_deadline_and_lifespan_reach_the_space() -> None:
     bench = Bench()
     client = Raw(bench).base()
     qos = Qos(reliable=True, depth=7, deadline=250, lifespan=400).asked
-    assert client.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER)) == STATUS_OK
-    assert client.make(READER, create.endpoint(KIND_DATAREADER, TOPIC, qos, SUBSCRIBER)) == STATUS_OK
+    assert client.make(WRITER, create.of_endpoint(KIND_DATAWRITER, TOPIC, qos, PUBLISHER)) == STATUS_OK
+    assert client.make(READER, create.of_endpoint(KIND_DATAREADER, TOPIC, qos, SUBSCRIBER)) == STATUS_OK
     for endpoint in (*bench.space.graph.writers, *bench.space.graph.readers):
         assert endpoint.qos.deadline == 250_000_000
         assert endpoint.qos.depth == 7
@@ -525,8 +525,8 @@ def test_deadline_and_lifespan_reach_the_space() -> None:
 def test_incompatible_qos_is_told() -> None:
     bench = Bench()
     writer, reader = Raw(bench, "w", 1).base(), Raw(bench, "r", 2).base()
-    writer.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, BEST_EFFORT, PUBLISHER))
-    reader.make(READER, create.endpoint(KIND_DATAREADER, TOPIC, RELIABLE, SUBSCRIBER))
+    writer.make(WRITER, create.of_endpoint(KIND_DATAWRITER, TOPIC, BEST_EFFORT, PUBLISHER))
+    reader.make(READER, create.of_endpoint(KIND_DATAREADER, TOPIC, RELIABLE, SUBSCRIBER))
     reader.read()
     writer.write(b"a")
     assert reader.samples() == []
@@ -539,7 +539,7 @@ def test_a_full_reader_that_keeps_all_pushes_back_and_loses_nothing() -> None:
     keep_all = SpaceQos(history=History.KEEP_ALL)
     reader = bench.space.participant("slow").reader(Topic("rt/chatter", "T"), keep_all)
     client = Raw(bench).base()
-    client.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, KEEP_ALL, PUBLISHER))
+    client.make(WRITER, create.of_endpoint(KIND_DATAWRITER, TOPIC, KEEP_ALL, PUBLISHER))
     first = client.numbers[STREAM_RELIABLE]
     stream = bench.core.clients[client.key].inputs[STREAM_RELIABLE]
     messages = [submessage(7, client.ids(WRITER) + bytes((n, half))) for n in range(10) for half in (0, 1)]
@@ -564,7 +564,7 @@ def test_a_writer_that_is_deleted_while_its_stream_is_held_frees_the_stream() ->
     bench = Bench(resource_limit=1)
     bench.space.participant("dead").reader(Topic("rt/chatter", "T"), SpaceQos(history=History.KEEP_ALL))
     client = Raw(bench).base()
-    client.make(WRITER, create.endpoint(KIND_DATAWRITER, TOPIC, KEEP_ALL, PUBLISHER))
+    client.make(WRITER, create.of_endpoint(KIND_DATAWRITER, TOPIC, KEEP_ALL, PUBLISHER))
     client.write(b"a")
     number = client.send(STREAM_RELIABLE, submessage(7, client.ids(WRITER) + b"b"))
     assert client.delete(WRITER, stream=STREAM_BEST_EFFORT) == STATUS_OK

@@ -307,9 +307,9 @@ def written(variant: Variant) -> bytes:
     if (getattr(entity, "name", "") is None and variant.kind == 1) or getattr(entity, "qos", 0) is None:
         return encode_variant(variant, 4)  # without a name, without QoS: nothing that ours writes
     if isinstance(entity, ParticipantEntity):
-        return create.participant(entity.name or "", variant.domain or 0)
+        return create.of_participant(entity.name or "", variant.domain or 0)
     if isinstance(entity, TopicEntity):
-        return create.topic(entity.name, entity.type_name or "", parent)
+        return create.of_topic(entity.name, entity.type_name or "", parent)
     if isinstance(entity, DataWriterEntity | DataReaderEntity):
         assert entity.qos is not None
         qos = Qos(
@@ -323,9 +323,9 @@ def written(variant: Variant) -> bytes:
             }[entity.qos.durability],
             not entity.qos.keep_last,
         ).asked
-        return create.endpoint(variant.kind, entity.topic_id or 0, qos, parent)
+        return create.of_endpoint(variant.kind, entity.topic_id or 0, qos, parent)
     if isinstance(entity, RequesterEntity | ReplierEntity):
-        return create.service(
+        return create.of_service(
             variant.kind,
             entity.service_name,
             entity.request_type,
@@ -334,7 +334,7 @@ def written(variant: Variant) -> bytes:
             entity.reply_topic or "",
             parent,
         )
-    return create.group(variant.kind, parent)
+    return create.of_group(variant.kind, parent)
 
 
 def replay(recorded: dict[str, Any], client: int = 0, history: int = 16) -> tuple[Any, Any, list[Puppet]]:

@@ -53,18 +53,18 @@ def test_binary(case: dict[str, Any]) -> None:
     arguments, kind = case["args"], KINDS[case["entity"]]
     parent = (arguments.get("parent", 0) << 4) | {5: 3, 6: 4}.get(kind, 1)
     if kind == 1:
-        made = create.participant(arguments["name"], arguments["domain"])
+        made = create.of_participant(arguments["name"], arguments["domain"])
     elif kind == 2:
-        made = create.topic(arguments["topic"], arguments["type"], parent)
+        made = create.of_topic(arguments["topic"], arguments["type"], parent)
     elif kind in (3, 4):
-        made = create.group(kind, parent)
+        made = create.of_group(kind, parent)
     elif kind in (5, 6):
-        made = create.endpoint(kind, arguments["topic_id"] << 4 | 2, qos(arguments["qos"]).asked, parent)
+        made = create.of_endpoint(kind, arguments["topic_id"] << 4 | 2, qos(arguments["qos"]).asked, parent)
     else:
         names = [
             arguments[n] for n in ("service", "request_type", "reply_type", "request_topic", "reply_topic")
         ]
-        made = create.service(kind, names[0], names[1], names[2], names[3], names[4], parent)
+        made = create.of_service(kind, names[0], names[1], names[2], names[3], names[4], parent)
     assert made == zeroed(case)
 
 
@@ -79,16 +79,16 @@ def test_text(case: dict[str, Any]) -> None:
     chatter, string = "rt/chatter", "std_msgs::msg::dds_::String_"
     parent = int(case["create_payload_hex"][-4:], 16)
     if kind == 1:
-        made = xml.participant("talker", 0)
+        made = xml.of_participant("talker", 0)
     elif kind == 2:
-        made = xml.topic(chatter, string, parent)
+        made = xml.of_topic(chatter, string, parent)
     elif kind in (3, 4):
-        made = xml.group(kind, parent)
+        made = xml.of_group(kind, parent)
     elif kind in (5, 6):
-        made = xml.endpoint(kind, 2, Qos(kind == 5, keep_all=True).asked, parent, chatter, string)
+        made = xml.of_endpoint(kind, 2, Qos(kind == 5, keep_all=True).asked, parent, chatter, string)
     else:
         add = "example_interfaces::srv::dds_::AddTwoInts_"
-        made = xml.service(
+        made = xml.of_service(
             kind,
             "/add_two_ints",
             f"{add}Request_",
@@ -108,7 +108,7 @@ def test_every_qos_is_read_back(
 ) -> None:
     asked = Qos(reliable, depth, "transient_local", keep_all, deadline, lifespan).asked
     for kind in (5, 6):
-        made = create.endpoint(kind, 0x0012, asked, 0x0013)
+        made = create.of_endpoint(kind, 0x0012, asked, 0x0013)
         entity = parse_variant_untrusted(made, 0, len(made), True).entity
         assert isinstance(entity, DataWriterEntity | DataReaderEntity)
         assert entity.qos is not None
@@ -124,7 +124,7 @@ def test_every_qos_is_read_back(
     st.integers(-1, 232),
 )
 def test_names_of_any_letters_are_read_back(name: str, domain: int) -> None:
-    made = create.participant(name, domain)
+    made = create.of_participant(name, domain)
     variant = parse_variant_untrusted(made, 0, len(made), True)
     assert encode_variant(variant) == made
     assert variant.domain == domain

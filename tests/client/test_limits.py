@@ -69,7 +69,7 @@ def test_the_agent_reads_every_qos_from_xml(
 ) -> None:
     asked = Qos(reliable, depth, durability, keep_all, deadline, lifespan).asked
     for kind in (5, 6):
-        variant = create_text.Xml().endpoint(kind, 0x12, asked, 0x13, "rt/a", STRING)
+        variant = create_text.Xml().of_endpoint(kind, 0x12, asked, 0x13, "rt/a", STRING)
         text = variant[8:].split(b"\0")[0].decode()
         entity: Any = parse_document_untrusted(Kind(kind), text).entity
         qos = entity.qos

@@ -117,12 +117,12 @@ def variant(entity: "Entity", step: int) -> "Any":
     name = entity.name
     kind = entity.id & 15
     if kind == _KIND_PARTICIPANT:
-        return create.participant(name, entity.domain)
+        return create.of_participant(name, entity.domain)
     above = entity.above
     parent = (above & (1 << _PARENT_BITS) - 1) << 4 | _KIND_PARTICIPANT
     type_name = entity.type_name
     if hasattr(entity, "room"):  # a side of a service
-        return create.service(
+        return create.of_service(
             kind,
             name,
             dds_type(type_name, "_Request"),
@@ -133,10 +133,10 @@ def variant(entity: "Entity", step: int) -> "Any":
         )
     type_name = dds_type(type_name)
     if step == _TOPIC:
-        return create.topic(name, type_name, parent)
+        return create.of_topic(name, type_name, parent)
     if step == _GROUP:
-        return create.group(kind - 2, parent)
-    return create.endpoint(kind, above >> _PARENT_BITS, entity.qos, entity.id - 2, name, type_name)
+        return create.of_group(kind - 2, parent)
+    return create.of_endpoint(kind, above >> _PARENT_BITS, entity.qos, entity.id - 2, name, type_name)
 
 
 def _reading(entity: "Entity") -> bytes:

@@ -1,6 +1,6 @@
 """CREATE and READ_DATA payloads as a client writes them, in the binary representation (DDS-XRCE 1.0, 7.7.3).
 
-Every function returns the ObjectVariant of a CREATE, that is its payload behind the request id and the object id.
+Functions return the ObjectVariant of something, the payload of its CREATE behind the request id and the object id.
 Ids are integers: ``index << 4 | kind``. Padding is zero. The XML and reference formats are in ``create_text``.
 """
 
@@ -22,22 +22,22 @@ _KIND_TOPIC = const(2)
 _KIND_DATAWRITER = const(5)
 
 
-def participant(name: str, domain: int) -> bytes:
+def of_participant(name: str, domain: int) -> bytes:
     """A participant with a name, in a domain."""
     return _variant(_KIND_PARTICIPANT, domain, b"\0\1", name)
 
 
-def topic(name: str, type_name: str, parent: int) -> bytes:
+def of_topic(name: str, type_name: str, parent: int) -> bytes:
     """A topic of a participant, by its names in DDS (``rt/chatter``, ``std_msgs::msg::dds_::String_``)."""
     return _variant(_KIND_TOPIC, parent, name, b"\0\1", type_name)
 
 
-def group(kind: int, parent: int) -> bytes:
+def of_group(kind: int, parent: int) -> bytes:
     """A publisher or a subscriber (``kind`` 3 or 4) of a participant."""
     return _variant(kind, parent, b"\0\0")
 
 
-def endpoint(
+def of_endpoint(
     kind: int, topic_id: int, qos: "Asked", parent: int, name: str = "", type_name: str = ""
 ) -> bytes:
     """A datawriter or a datareader (``kind`` 5 or 6) of a publisher or subscriber.
@@ -53,7 +53,7 @@ def endpoint(
     return _variant(kind, parent, blob, bytes(2 if kind == _KIND_DATAWRITER else 3))
 
 
-def service(
+def of_service(
     kind: int,
     name: str,
     request_type: str,

@@ -29,21 +29,21 @@ _DURABILITIES = ("TRANSIENT_LOCAL", "TRANSIENT", "PERSISTENT")  # flags 8, 16 an
 class Xml:
     """Writes entities as XML."""
 
-    def participant(self, name: str, domain: int) -> bytes:
+    def of_participant(self, name: str, domain: int) -> bytes:
         """A participant with a name, in a domain."""
         text = _tag("dds", _tag("participant", _tag("rtps", _tag("name", name))))
         return participant_by_text(_AS_XML, text, domain)
 
-    def topic(self, name: str, type_name: str, parent: int) -> bytes:
+    def of_topic(self, name: str, type_name: str, parent: int) -> bytes:
         """A topic of a participant."""
         text = _tag("dds", _tag("topic", _names(name, type_name)))
         return by_text(_KIND_TOPIC, _AS_XML, text, parent)
 
-    def group(self, kind: int, parent: int) -> bytes:
+    def of_group(self, kind: int, parent: int) -> bytes:
         """A publisher or a subscriber: the defaults."""
         return by_text(kind, _AS_XML, "", parent)
 
-    def endpoint(
+    def of_endpoint(
         self, kind: int, topic_id: int, qos: "Asked", parent: int, name: str, type_name: str
     ) -> bytes:
         """A datawriter or a datareader."""
@@ -67,7 +67,7 @@ class Xml:
         text = _tag("data_writer" if kind == _KIND_DATAWRITER else "data_reader", text)
         return by_text(kind, _AS_XML, _tag("dds", text), parent)
 
-    def service(
+    def of_service(
         self,
         kind: int,
         name: str,
@@ -97,15 +97,15 @@ class Reference(Xml):
     def __init__(self, profile: str) -> None:
         self.profile = profile
 
-    def participant(self, name: str, domain: int) -> bytes:
+    def of_participant(self, name: str, domain: int) -> bytes:
         """A participant by its profile."""
         return participant_by_text(_BY_REFERENCE, self.profile, domain)
 
-    def topic(self, name: str, type_name: str, parent: int) -> bytes:
+    def of_topic(self, name: str, type_name: str, parent: int) -> bytes:
         """A topic by its profile, ``chatter__t``."""
         return by_text(_KIND_TOPIC, _BY_REFERENCE, _profile(name) + "__t", parent)
 
-    def endpoint(
+    def of_endpoint(
         self, kind: int, topic_id: int, qos: "Asked", parent: int, name: str, type_name: str
     ) -> bytes:
         """A datawriter or a datareader by its profile, ``chatter__dw`` or ``chatter__dr``."""
