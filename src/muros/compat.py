@@ -47,8 +47,8 @@ if MPY:
         while loans:
             name = loans.pop()
             del modules[name]
-            at = name.rfind(".")
-            delattr(modules[name[:at]], name[at + 1 :])
+            package, name = name.rsplit(".", 1)
+            delattr(modules[package], name)
 
     def lend(owner, module, name):  # type: ignore[no-untyped-def]
         """``owner``'s method ``name``: a function of a borrowed module, which takes ``owner`` first."""

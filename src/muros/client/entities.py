@@ -18,14 +18,10 @@ _TOPIC = const(3)
 _GROUP = const(2)
 _REFUSED = const(0x10)
 _PARENT_BITS = const(12)
-_STEPS = b"\0\2\0\0\0\x0e\x0f\3\3"  # by kind of object
 
 UNLIMITED = const(0xFFFF)
-
-
-def steps(entity: "Entity") -> int:
-    """The steps of the creation: bit i stands for step i."""
-    return _STEPS[entity.id & 15]
+STEPS = b"\0\2\0\0\0\x0e\x0f\3\3"
+"""The steps of the creation, by kind of object: bit i stands for step i."""
 
 
 def renew(entity: "Entity") -> None:
@@ -33,7 +29,7 @@ def renew(entity: "Entity") -> None:
     entity.request = 0
     if entity.status:
         entity.status = 0
-    entity.todo = steps(entity)
+    entity.todo = STEPS[entity.id & 15]
 
 
 def object_id(self: "Entity", step: int) -> int:
@@ -57,7 +53,7 @@ def destroy(self: "Entity") -> None:
     self.status = 1
     backlog = session.keep()
     for step in (_TOPIC, 1, _GROUP):
-        if steps(self) >> step & 1:
+        if STEPS[self.id & 15] >> step & 1:
             session.asked.pop(self.request - step, None)
             backlog.items.append(head(_DELETION, 4, session.number(), object_id(self, step)))
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from muros.client import closing, echo, making, reasons
 from muros.client import session as board
-from muros.client.entities import steps
+from muros.client.entities import STEPS
 from muros.client.link import CONNECTED
 from muros.client.problems import SESSION
 from muros.client.sharing import Endpoint, Replier, Requester, Turnstile
@@ -277,7 +277,7 @@ def _unused(session: board.Session, kind: int) -> list[int]:
         entity.object_id(step)
         for entity in session.entities
         for step in (1, 2, 3)
-        if steps(entity) >> step & 1
+        if STEPS[entity.id & 15] >> step & 1
     }
 
     def deleted(buf: Buffer, off: int, n: int) -> None:

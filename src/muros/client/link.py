@@ -19,8 +19,6 @@ Boards borrow this: it is the ``guide`` of a session until that is connected and
 names of states before there is a session, what sessions keep is not imported at the top.
 """
 
-from struct import pack_into
-
 from muros.compat import MPY, borrow, const, ticks_add, ticks_diff
 
 TYPE_CHECKING = const(0)
@@ -56,7 +54,6 @@ _STATUS = const(5)
 _INFO = const(6)
 _OBJECT_AGENT = const(0xFFFD)
 _OBJECT_CLIENT = const(0xFFFE)
-_PAYLOAD = const(12)  # where that of a control message lies
 _SOON = const(250)  # ms between attempts while an agent is expected back
 _SLOWLY = const(5000)  # ms until a refused session asks again
 _TRIES = const(4)  # unanswered attempts to connect again until we wait
@@ -86,16 +83,16 @@ def turn(session: "Session", now: int) -> None:
 
 def happened(session: "Session", event: int) -> None:
     """Takes an event through the table."""
-    new = _NEXT[session.state * _EVENTS + event]
+    before = session.state
+    new = _NEXT[before * _EVENTS + event]
     session._ping = session._tries = 0
     session.away = new >> 4
-    state = new & 15
-    if state != session.state:
-        session.state = state
-        if state == CONNECTED and session.trouble:
+    session.state = new & 15
+    if session.state != before:
+        if session.state == CONNECTED and session.trouble:
             session.trouble = None
         if session.on_state is not None:
-            session.on_state(state)
+            session.on_state(session.state)
 
 
 def answer(session: "Session", kind: int, buf: "Buffer", off: int, n: int) -> None:
@@ -107,10 +104,7 @@ def answer(session: "Session", kind: int, buf: "Buffer", off: int, n: int) -> No
         request = buf[off] << 8 | buf[off + 1]
         number = buf[off + 2] << 8 | buf[off + 3]
         if kind == _GET_INFO:
-            from muros.xrce.session import control
-
-            pack_into(">HHI", session._control, _PAYLOAD, request, number, 0)
-            control(session, _INFO, 8)
+            session.inform(_INFO, request, number, 0)
         elif kind == _INFO:
             if request and request == session._ping:
                 happened(session, _KNOWN if buf[off + 5] else _UNKNOWN)

@@ -19,7 +19,7 @@ def resolve(name: str, namespace: str, node: str) -> str:
         name = node + name[1:]
     elif name[0] == "/":
         return name
-    return (namespace if namespace != "/" else "") + "/" + name
+    return namespace + name if namespace[-1:] == "/" else namespace + "/" + name
 
 
 def topic_name(prefix: str, name: str, suffix: str = "", limit: int = _NAME) -> str:

@@ -32,6 +32,7 @@ _WRITE = const(0x0107)  # a WRITE_DATA, little endian
 _DATA = const(9)
 _TIMESTAMP_REPLY = const(15)
 _OBJECT_AGENT = const(0xFFFD)
+_OF_AGENTS = const(0x02000000)  # what we want to know of it
 _FIRST_REQUEST = const(10)
 _LAST_REQUEST = const(0xFFFE)
 _PAYLOAD = const(12)  # where that of a control message lies
@@ -133,7 +134,7 @@ class Session(SessionCore):
         if now is None:
             now = ticks_ms()
         self.now = now
-        taken = _receive(self) if self.up else 0
+        taken = _receive(self)
         _turn(self, now)
         if not self.away:
             if self.backlog:
@@ -168,8 +169,12 @@ class Session(SessionCore):
         """Asks the agent whether it knows the session."""
         if not self._ping:
             self._ping = self.number()
-        pack_into(">HHI", self._control, _PAYLOAD, self._ping, _OBJECT_AGENT, 0x02000000)
-        control(self, _GET_INFO, 8)
+        self.inform(_GET_INFO, self._ping, _OBJECT_AGENT, _OF_AGENTS)
+
+    def inform(self, kind: int, request: int, number: int, what: int) -> None:
+        """Asks for information about an object or gives it, in a message of no stream."""
+        pack_into(">HHI", self._control, _PAYLOAD, request, number, what)
+        control(self, kind, 8)
 
     def number(self, count: int = 1) -> int:
         """A request id, the last of ``count`` in a row."""
@@ -188,17 +193,19 @@ class Session(SessionCore):
 
     def deadline(self, now: int) -> int:
         """Milliseconds from ``now`` until ``spin_once`` has something to do of its own accord."""
-        left = _NEVER
         if self._tries:
             left = ticks_diff(self._due, now)
         elif self.away:
             left = 0
         elif self.keepalive:
             left = self.keepalive - ticks_diff(now, self._heard)
+        else:
+            left = _NEVER
         if self.pending:
             left = min(left, ticks_diff(self.late, now)) if self.asked else 0
-        if self.reliable.first != self.reliable.next:
-            left = min(left, ticks_diff(self.reliable.due, now))
+        stream = self.reliable
+        if stream.first != stream.next:
+            left = min(left, ticks_diff(stream.due, now))
         return max(left, 1)
 
     def deliver(self, buf: "Buffer", off: int, n: int) -> None:
@@ -219,7 +226,7 @@ class Session(SessionCore):
                     reader.deliver(buf, off + 4, n - 4)
             else:
                 taker = self.objects.get(-kind)
-                if taker is not None:
+                if taker:
                     taker(buf, off, n)
                 if kind == _INFO and not self.guide and n >= 6 and buf[off + 5]:
                     pass  # the agent is there, as we thought
@@ -307,7 +314,8 @@ def _turn(session: Session, now: int) -> None:
 def _receive(session: Session) -> int:
     """Takes what has come; the number of messages. The transport raises when the way is gone."""
     try:
-        return session.transport.receive(session._deliver)
+        if session.up:
+            return session.transport.receive(session._deliver)
     except OSError as error:
         session.gone(error)
     except MemoryError:
