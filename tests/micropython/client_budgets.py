@@ -110,7 +110,7 @@ agent = Agent(256)
 CONNECTED = """
 import muros.client.chance, muros.compat
 muros.compat.collect = lambda: None  # one of the builds has no safe collector
-muros.client.chance.draw = bytes  # one of the builds has no entropy
+muros.client.chance.draw = int  # one of the builds has no entropy
 from tests.board.test_client import Board
 from muros.client.raw import Raw
 board = Board(256)

@@ -1,13 +1,13 @@
-"""Random bytes, on boards with and without a source of entropy."""
+"""Random numbers, on boards with and without a source of entropy."""
 
 from muros.compat import ticks_us
 
 
-def draw(n: int) -> bytes:
-    """``n`` random bytes, 4 at most."""
+def draw() -> int:
+    """A random number of 32 bits."""
     try:
         from os import urandom
 
-        return urandom(n)
-    except (ImportError, OSError):  # a build without a source: the time since power-on has to do
-        return ticks_us().to_bytes(8, "little")[:n]
+        return int.from_bytes(urandom(4), "big")
+    except (ImportError, OSError):  # a board without a source: the time since power-on, 30 bits, has to do
+        return ticks_us()

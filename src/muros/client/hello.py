@@ -17,7 +17,7 @@ _CREATE_CLIENT = const(0x0100)  # little endian
 _ONE = b"\1\0\0\1\0\0\0"  # so many properties follow
 _TWO = b"\1\0\0\2\0\0\0"
 _LIVELINESS = b"\7\0\0\0uxr_hl\0\0\7\0\0\0%06d\0\0"  # a property, padded for whatever follows
-_ATTEMPT = b"\x09\0\0\0muros_id\0\0\0\0\x09\0\0\0%02x%02x%02x%02x\0\0"
+_ATTEMPT = b"\x09\0\0\0muros_id\0\0\0\0\x09\0\0\0%08x\0\0"
 
 
 def hello(session: "Session") -> bytes:
@@ -33,7 +33,7 @@ def hello(session: "Session") -> bytes:
     else:
         body += _ONE if session.properties else b"\0"
     if session.properties:
-        session.attempt = session.attempt or draw(4)
-        body += _ATTEMPT % tuple(session.attempt)
+        session.attempt = session.attempt or draw()
+        body += _ATTEMPT % session.attempt
     body += pack("<H", session.reliable.mtu)
     return pack("<I", head[0] & _SESSION_NONE) + head[4:] + pack("<HH", _CREATE_CLIENT, len(body)) + body

@@ -181,8 +181,7 @@ def _on_status_agent(session: "Session", status: int) -> None:
     if session.away != _LOGIN:
         _suspect(session)  # the network repeated our CREATE_CLIENT
     elif status < 0x80:
-        session.attempt = b""
-        session.foreign = session.probe = 0
+        session.attempt = session.foreign = session.probe = 0
         borrow("muros.client.creating").accepted(session)
         happened(session, _ACCEPTED)
     else:

@@ -87,7 +87,7 @@ class Session(SessionCore):
         laps: int  # how often that was in vain
         counts: "list[int]"  # the next index for each kind of object
         key: bytes
-        attempt: bytes  # what names the attempt to connect, empty until it is made
+        attempt: int  # what names the attempt to connect, 0 until it is made
         suspected: int  # the tick since which the agent seems to be out of step
         queue: int
         retry: int

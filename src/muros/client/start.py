@@ -37,7 +37,7 @@ def start(
 ) -> None:
     """Sets up a session; arguments as for ``Session``."""
     if client_key is None:
-        client_key = int.from_bytes(draw(4), "big") | 1
+        client_key = draw() | 1
     if isinstance(client_key, int):
         client_key = client_key.to_bytes(4, "big")
     if len(client_key) != 4 or client_key == bytes(4):
@@ -53,8 +53,7 @@ def start(
     self.request = _FIRST_REQUEST - 1
     self.away = _LOGIN
     self.up = False
-    self.state = self._tries = self._ping = self.pending = self.laps = 0
-    self.attempt = b""
+    self.state = self._tries = self._ping = self.attempt = self.pending = self.laps = 0
     self.drops = [0] * 5
     self.entities = []
     self.objects = {}

@@ -1,5 +1,7 @@
 """What actions need now and then: making and destroying them, cancelling, and what is refused. Boards borrow this."""
 
+from struct import pack
+
 from muros.client.chance import draw
 from muros.client.qos import Qos
 from muros.compat import borrow, const, ticks_add, ticks_diff
@@ -250,7 +252,7 @@ def new_id(middleware: "Any" = None) -> bytes:
     Where a board has no source of chance but its clock, the key of its session and the number of the request tell
     goals apart.
     """
-    made = bytearray(draw(4) + draw(4) + draw(4) + draw(4))
+    made = bytearray(pack("<4I", draw(), draw(), draw(), draw()))
     own = getattr(middleware, "notes", {}).get("key", b"") + bytes((getattr(middleware, "request", 0) & 255,))
     for i in range(len(own)):
         made[i] ^= own[i]
