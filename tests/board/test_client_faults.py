@@ -85,6 +85,20 @@ def test_reading_again_keeps_the_answers_of_others() -> None:
     assert late.publish(Raw(b"1234"))
 
 
+def test_a_reading_that_is_refused_is_told_when_nothing_else_is_asked_for() -> None:
+    board = Board()
+    told: "list[tuple[int, str]]" = []
+    board.session.on_problem = lambda code, text: told.append((code, text))
+    board.reader.read(5)
+    settle(board)
+    request = board.reader.request
+    for status in (0, 0x87):
+        said = bytes((request >> 8, request & 255, board.reader.id >> 8, board.reader.id & 255, status, 0))
+        board.agent.reliable(b"\x05\x01\x06\x00" + said)
+        settle(board)
+    assert told == [(4, "the agent refuses to read " + board.reader.name + ": no resources (0x87)")]
+
+
 def test_request_ids_wrap() -> None:
     board = Board()
     requester = board.session.requester(

@@ -111,7 +111,7 @@ def answer(session: "Session", kind: int, buf: "Buffer", off: int, n: int) -> No
         elif kind == _STATUS:
             if number == _OBJECT_CLIENT:
                 session.away = _LOGIN  # the agent has taken our leave
-            elif session.asked:
+            else:
                 borrow("muros.client.creating").status(session, request, number, buf[off + 4])
 
 
