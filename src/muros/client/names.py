@@ -13,13 +13,9 @@ def resolve(name: str, namespace: str, node: str) -> str:
     """
     if not name:
         raise ValueError("a topic or service needs a name")
-    if "{" in name:
-        name = name.replace("{node}", node).replace("{namespace}", namespace).replace("{ns}", namespace)
-    if name[0] == "~":
-        name = node + name[1:]
-    elif name[0] == "/":
-        return name
-    return namespace + name if namespace[-1:] == "/" else namespace + "/" + name
+    if "{" in name or "~" in name or "/" in name:
+        return _expanded(name, namespace, node)
+    return _below(namespace, name)
 
 
 def topic_name(prefix: str, name: str, suffix: str = "", limit: int = _NAME) -> str:
