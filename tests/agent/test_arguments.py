@@ -43,6 +43,7 @@ def wrong(line: str, **environ: str) -> str:
         ("udp4 -d -p 1", LinkOptions(kind="udp4", port=1, discovery_port=7400)),
         ("udp4 -p 0 --bind 127.0.0.1", LinkOptions(kind="udp4", bind="127.0.0.1")),
         ("udp6 -p 1 --bind ::1", LinkOptions(kind="udp6", port=1, bind="::1")),
+        ("tcp4 -p 1 --connections 250", LinkOptions(kind="tcp4", port=1, connections=250)),
         ("serial --dev /dev/ttyUSB0", LinkOptions(kind="serial", devices=("/dev/ttyUSB0",))),
         (
             "serial --dev /dev/serial/by-id/usb-FTDI-if00-port0 -v6 -b 921600",
@@ -340,6 +341,10 @@ def test_the_command_line_has_the_last_word(tmp_path: Path) -> None:
             ":3: devices: a serial link has one device: use multiserial",
         ),
         ("[[link]]\nkind = 'udp4'\nport = 1\nbind = '::1'", ":4: bind ::1: not an IPv4 address"),
+        (
+            "[[link]]\nkind = 'tcp4'\nport = 1\nconnections = 0",
+            ":4: connections = 0: out of range: it must be",
+        ),
         ("limits = 3", ":1: limits: write limits as a [limits] table"),
         (
             "[[link]]\nkind = 'udp4'\nport = 1\n[limits]\nwindow = 4\nmax_cliens = 1",

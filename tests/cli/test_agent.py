@@ -1,5 +1,6 @@
 """`muros agent` as a user meets it: a process, its output, its exit status."""
 
+import asyncio
 import re
 import shlex
 import signal
@@ -16,6 +17,7 @@ from muros import cli
 from muros.agent.arguments import parse_arguments
 from muros.cli.agent import make_links
 from muros.links import DiscoveryLink
+from muros.links.testing import Recorder
 from muros.rosserial.node_handle import NodeHandle
 from muros.rosserial.tcp import Tcp
 from muros.rosserial.types import message
@@ -231,3 +233,24 @@ def test_links_are_made_as_asked_for(line: str, names: list[str] | None) -> None
         assert [name.rpartition(":")[2] for name in made] == ["1", "2", "3", "7400", "7500"]
     else:
         assert made == names
+
+
+def test_a_tcp_link_holds_as_many_connections_as_asked_for() -> None:
+    options = parse_arguments(shlex.split("tcp4 -p 0 --bind 127.0.0.1 --connections 1"), {})
+    assert options is not None
+    ((link, _),) = make_links(options)
+
+    async def program() -> bytes:
+        link.open(Recorder())
+        port = int(link.name.rpartition(":")[2])
+        first = await asyncio.open_connection("127.0.0.1", port)
+        second = await asyncio.open_connection("127.0.0.1", port)
+        ended = await asyncio.wait_for(second[0].read(), 10)
+        assert not first[0].at_eof()
+        for _, writer in (first, second):
+            writer.close()
+        link.close()
+        return ended
+
+    assert asyncio.run(program()) == b""
+    assert link.counters.dropped == {"too-many-connections": 1}

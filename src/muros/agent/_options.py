@@ -16,6 +16,8 @@ BAUDRATE: Final = 115200
 """Bits per second of a serial line unless told otherwise."""
 ROSSERIAL_BAUDRATE: Final = 57600
 """The same for boards with rosserial firmware."""
+CONNECTIONS: Final = 100
+"""Connections that a TCP link holds at the same time unless told otherwise."""
 VERBOSE: Final = 4
 """How much is told unless told otherwise: clients that come and go."""
 
@@ -67,6 +69,7 @@ TRANSPORTS: Final = {
 }
 
 IP_TRANSPORTS = frozenset({"udp4", "udp6", "tcp4", "tcp6"})
+_TCP = frozenset({"tcp4", "tcp6"})
 _SERIAL = frozenset({"serial", "multiserial"})
 _TERMINAL = _SERIAL | {"pseudoterminal", "rosserial"}
 _LISTENING = IP_TRANSPORTS | {"rosserial"}
@@ -159,6 +162,14 @@ OPTIONS: Final = (
         integer(1, 65535),
         DISCOVERY_PORT,
         IP_TRANSPORTS,
+    ),
+    Option(
+        "connections",
+        ("--connections",),
+        f"connections that TCP holds at the same time (default {CONNECTIONS})",
+        "N",
+        integer(1, 1_000_000),
+        transports=_TCP,
     ),
     Option(
         "p2p",

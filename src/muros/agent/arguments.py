@@ -21,6 +21,7 @@ from muros.agent._options import (
     BAUDRATE,
     BY_FLAG,
     BY_KEY,
+    CONNECTIONS,
     DISCOVERY_PORT,
     IP_TRANSPORTS,
     MIDDLEWARE,
@@ -58,6 +59,8 @@ class LinkOptions:
     """UDP and TCP: the address to listen on; None is every one."""
     discovery_port: int | None = None
     """UDP and TCP: answer clients that look for an agent on this port; None: do not."""
+    connections: int = CONNECTIONS
+    """TCP: connections that are held at the same time."""
     devices: tuple[str, ...] = ()
     """Serial ports, the CAN interface, or the symbolic link to the far end of a pseudoterminal."""
     baudrate: int = BAUDRATE
@@ -157,7 +160,7 @@ def help_text() -> str:
 
 
 def _listens(option: Option) -> bool:
-    return option.transports >= IP_TRANSPORTS
+    return bool(option.transports & IP_TRANSPORTS)
 
 
 @dataclass(slots=True)
@@ -302,6 +305,7 @@ def _link(place: _Place) -> LinkOptions:
         port=values.get("port", 0),
         bind=values.get("bind"),
         discovery_port=values.get("discovery") or None,
+        connections=values.get("connections", CONNECTIONS),
         devices=_devices(place),
         baudrate=values.get("baudrate", ROSSERIAL_BAUDRATE if place.kind == "rosserial" else BAUDRATE),
         can_id=values.get("id", 1),

@@ -94,6 +94,8 @@ def _make_link(options: LinkOptions) -> Link:
             return PseudoterminalLink(options.devices[0] if options.devices else None)
         case "canfd":
             return CanLink(options.devices[0])
+        case "tcp4" | "tcp6":
+            return LINK_KINDS[options.kind](options.port, options.bind, connections=options.connections)
         case kind:
             return LINK_KINDS[kind](options.port, options.bind)
 

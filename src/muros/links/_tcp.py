@@ -142,7 +142,7 @@ class TcpLink(Link):
         cause = Cause(
             "too-many-connections",
             f"{self._limit} clients are connected, and no more are allowed",
-            "Allow more with the argument connections.",
+            "Allow more with the argument connections (muros agent tcp4: --connections).",
         )
         self._problem(cause, f"connection from {self.describe(address)} refused")
 
