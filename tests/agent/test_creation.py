@@ -574,3 +574,11 @@ def test_a_refused_client_is_told_with_its_cause(wrong: str, why: str) -> None:
     assert finding.code == "client-refused"
     assert why in finding.format()
     assert "max_clients" not in finding.format()
+
+
+def test_refused_clients_of_one_address_are_one_finding_whatever_their_keys() -> None:
+    bench = Bench()
+    for key in range(1, 6):
+        bench.receive(bytes.fromhex(f"80000000 00011000 58524345 0200 010f 000000{key:02x} 81 00 fc01"))
+    (finding,) = bench.findings.snapshot()
+    assert (finding.code, finding.count) == ("client-refused", 5)

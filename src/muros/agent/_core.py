@@ -439,7 +439,7 @@ class AgentCore(Voice[Event]):
             self.report(
                 "client-refused",
                 who=port.link.describe(address),
-                subject=asked.key.hex(),
+                subject=STATUS_NAMES[result],
                 what=f"{{n}} client{{s}} at {port.link.describe(address)} refused with {STATUS_NAMES[result]}",
                 why=_REFUSALS[result][0],
                 remedy=_REFUSALS[result][1],
