@@ -248,7 +248,7 @@ CLIENT_BUDGETS: tuple[Budget, ...] = (
     ),
     Budget("import of client and rclc, small", 13_000, "B", GAUGE, partial(imported_small, SMALL_CORE)),
     Budget(
-        "bytecode of client and rclc with what is borrowed, small", 19_600, "B", ("mpy-cross",), flash_small
+        "bytecode of client and rclc with what is borrowed, small", 16_000, "B", ("mpy-cross",), flash_small
     ),
     Budget(
         "session, MTU 256, history 4, both directions",

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from muros.client.session import Session
 
 _SESSION_NONE = const(0x80)
-_CREATE_CLIENT = const(0x0100)  # little endian
+_CREATE_FIRST = const(0x0100)  # CREATE_CLIENT and its flags, little endian
 _ONE = b"\1\0\0\1\0\0\0"  # so many properties follow
 _TWO = b"\1\0\0\2\0\0\0"
 _LIVELINESS = b"\7\0\0\0uxr_hl\0\0\7\0\0\0%06d\0\0"  # a property, padded for whatever follows
@@ -36,4 +36,4 @@ def hello(session: "Session") -> bytes:
         session.attempt = session.attempt or draw()
         body += _ATTEMPT % session.attempt
     body += pack("<H", session.reliable.mtu)
-    return pack("<I", head[0] & _SESSION_NONE) + head[4:] + pack("<HH", _CREATE_CLIENT, len(body)) + body
+    return pack("<I", head[0] & _SESSION_NONE) + head[4:] + pack("<HH", _CREATE_FIRST, len(body)) + body
