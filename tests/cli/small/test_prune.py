@@ -93,3 +93,69 @@ def test_parameters_that_are_always_the_same_are_gone() -> None:
     modules = {"m": "def g(x, by=2, *, more=3):\n return x * by + more\ndef f(x):\n return [g(x), g(1)]"}
     text = small_text(modules, "from muros.m import f\nprint(f(5))")
     assert "* 2 + 3" in text
+
+
+def test_a_default_that_every_call_gives_is_gone() -> None:
+    modules = {"m": "def g(x, by=2):\n return x * by\ndef f(x):\n return [g(x, x), g(1, 4)]"}
+    assert "by=2" not in small_text(modules, "from muros.m import f\nprint(f(5))")
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "return [g(x, 3), g(x)]",
+        "def g(x, by=2): return x * by\n return [g(x, 3), g(x)]",
+        "work = lambda x, by=2: g(x, by)\n return [work(x), work(x, 4), g(x, 3)]",
+        "from muros.n import A\n return [A(x).by, B(x, 3).by]",
+        "return [h(*[x]), g(x, 3), g(*[x])]",
+    ],
+    ids="left-out inner lambda imported-within star".split(),
+)
+def test_a_default_that_somebody_needs_stays(body: str) -> None:
+    modules = {
+        "n": "class A:\n def __init__(self, x, by=2): self.by = x * by",
+        "m": f"""
+            from muros.n import A as B
+            def g(x, by=2): return x * by
+            def h(x, by=3): return g(x, by)
+            def f(x):
+             {body.replace(chr(10), chr(10) + "            ")}
+        """,
+    }
+    small_text(modules, "from muros.m import f\nprint(f(5))")
+
+
+LENDING = """
+def lend(owner, module, name):
+    method = getattr(__import__(module, None, None, ("*",)), name)
+    return lambda *given: method(owner, *given)
+class A:
+    lends = "muros.m"
+    def __getattr__(self, name):
+        return lend(self, self.lends, name)
+"""
+
+
+def test_nothing_is_looked_for_where_nothing_is_left() -> None:
+    modules = {"a": LENDING, "m": "def grow(self, by):\n self.n = by\n return by"}
+    assert "muros.m" in small_text(modules, "from muros.a import A\nprint(A().grow(5))")
+    assert "muros.m" not in small_text(modules, "from muros.a import A\nprint(A.__name__)")
+
+
+def test_a_constant_is_known_not_to_have_what_objects_have() -> None:
+    modules = {
+        "m": """
+            class A:
+                def __init__(self):
+                    self.age = 3
+            def f(x):
+                return age(x) + age("young")
+            def age(x):
+                return getattr(x, "age", 0)
+            def g(x="old"):
+                return getattr(x, "age", 7)
+        """
+    }
+    text = small_text(modules, "from muros.m import A, f, g\nprint(f(A()), g())")
+    assert "7" in text
+    assert text.count("getattr") == 1
