@@ -31,7 +31,9 @@ def test_a_sample_larger_than_largest_is_counted_and_told() -> None:
     assert device.got == [b"small"] * 3
     assert list(device.session.drops) == [0, 0, 0, 0, 3]
     assert [code for code, _ in device.problems] == [reasons.LARGEST] * 2, "the first, the second, the fourth"
-    assert "9008 B dropped: larger than largest=1000" in texts(device)[0]
+    first, second = texts(device)
+    assert "9008 B dropped: larger than largest=1000" in first
+    assert "9008 B dropped (2 samples by now): larger than largest=1000" in second
 
 
 def test_why_a_sample_cannot_go_out() -> None:
@@ -49,9 +51,14 @@ def test_why_a_sample_cannot_go_out() -> None:
     assert not session.defer(refused, Raw(b"later"), 5)
     early, at_once, status, later = texts(device)
     assert "5 B of rt/out dropped: no agent is connected. Session(queue=N)" in early
-    assert "7 B of rt/refused dropped: the agent has not created it yet. Session(queue=N)" in at_once
+    assert (
+        "7 B of rt/refused dropped (2 samples by now): the agent has not created it yet. Session(queue=N)"
+        in at_once
+    )
     assert "the agent refuses rt/refused: no resources" in status
-    assert "5 B of rt/refused dropped: the agent refused to create it: no resources" in later
+    assert (
+        "5 B of rt/refused dropped (4 samples by now): the agent refused to create it: no resources" in later
+    )
 
 
 def test_a_full_window_and_a_full_queue_are_told_apart() -> None:

@@ -22,6 +22,8 @@ LARGEST = 10
 SILENT = 11
 """Codes beside those of ``problems``."""
 
+_DROPS = {problems.OFFLINE: 0, problems.FULL: 1, problems.TOO_LARGE: 2, LARGEST: 4}
+"""Where samples are counted that are dropped so, in ``drops`` of a session."""
 _AGAIN = "Trying again."
 
 
@@ -37,15 +39,17 @@ def text(session: Session, code: int, value: int, what: Any) -> str:
         return _unreachable(session.transport, what)
     if code == SILENT:
         return _silent(session.transport, value)
+    said = problems.text(code, value, what)
     if code == LARGEST:
-        return (
+        said = (
             f"a sample of {value} B dropped: larger than largest={session.largest}, "
             "the longest that Session(largest=...) joins from fragments"
         )
-    if code in (problems.OFFLINE, problems.FULL):
+    elif code in (problems.OFFLINE, problems.FULL):
         why = _offline(session, what) if code == problems.OFFLINE else _full(session)
-        return f"{value} B of {what.name} dropped: {why}"
-    return problems.text(code, value, what)
+        said = f"{value} B of {what.name} dropped: {why}"
+    count = session.drops[_DROPS[code]] if code in _DROPS else 1
+    return said if count == 1 else said.replace(" dropped:", f" dropped ({count} samples by now):", 1)
 
 
 def _offline(session: Session, writer: Any) -> str:
