@@ -50,12 +50,12 @@ class Executor:
         self.trigger = trigger
         self.handles: "list[Any]" = context.handles
         if options:
-            self.begin(options)
+            self.take_options(options)
 
     if TYPE_CHECKING:
         on_error: "Any"
 
-        begin = periods.begin
+        take_options = periods.take_options
         add = handles.add
         remove = handles.remove
         spin_one_period = periods.spin_one_period

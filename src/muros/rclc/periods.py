@@ -17,7 +17,7 @@ _LOW_PRIORITY = const(5)
 _MESSAGES = const(10)
 
 
-def begin(executor: "Any", options: "dict[str, Any]") -> None:
+def take_options(executor: "Any", options: "dict[str, Any]") -> None:
     """Sets up an executor; ``options`` as for ``Executor``. Raises ValueError for what boards have not."""
     executor.period = int(options.pop("period", 0) * 1000 + 0.5)
     semantics = options.pop("semantics", 0)

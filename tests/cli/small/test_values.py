@@ -144,3 +144,48 @@ def test_a_default_is_of_its_own_module() -> None:
 def test_constants_that_stay_are_there(text: str) -> None:
     """What an expression may be is known, and yet it is kept."""
     small_text({"m": text}, "from muros.m import f\nprint(f(0), f(1))")
+
+
+def test_options_that_nobody_gives_are_none() -> None:
+    modules = {
+        "m": """
+            class A:
+                def __init__(self, way, **options):
+                    self.way = way
+                    if options:
+                        self.take(options)
+                def take(self, options):
+                    self.way = sorted(options)
+        """
+    }
+    assert "options" not in small_text(modules, "from muros.m import A\nprint(A(5).way)")
+    small_text(modules, "from muros.m import A\nprint(A(5).way, A(5, high=3).way)")
+    small_text(modules, "from muros.m import A\nmake = A\nprint(make(5, high=3).way)")
+
+
+@pytest.mark.parametrize(
+    ("text", "truth"),
+    [
+        ("x and 0", False),
+        ("x or 1", True),
+        ("x and 1", None),
+        ("x() and 0", None),
+        ("0 and x()", False),
+        ("not (x and 0)", None),
+    ],
+)
+def test_a_test_that_one_part_decides(text: str, truth: bool | None) -> None:
+    assert knowledge().truth(ast.parse(text, mode="eval").body, {"x": None}) is truth
+
+
+def test_what_packages_hand_on_is_given_what_programs_give() -> None:
+    exports = 'PLACES = {"rclc": "way A"}\n'
+    modules = {
+        "exports": exports,
+        "rclc": "from muros.rclc.way import A",
+        "rclc.way": "class A:\n def __init__(self, x, by=2):\n  self.x = x * by if by else 'never'",
+    }
+    text = small_text(modules, "from muros.rclc import A\nprint(A(5).x)")
+    assert "never" not in text
+    small_text(modules, "from muros.rclc import A\nprint(A(5, 0).x)")
+    small_text(modules, "import muros.rclc\nprint([kind(5, 0).x for kind in [muros.rclc.A]])")

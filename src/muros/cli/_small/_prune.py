@@ -7,12 +7,13 @@ from collections import Counter
 from collections.abc import Collection
 
 from muros.cli._small._bundles import HOME
-from muros.cli._small._reach import Reach, is_pure
+from muros.cli._small._reach import Reach
 from muros.cli._small._trees import (
     Function,
     Modules,
     Substitute,
     is_plain,
+    is_pure,
     literal,
     stored,
     variables,
@@ -123,6 +124,12 @@ class _Pruner(ast.NodeTransformer):
             return not self._reach.is_explicit(node, one.arg)
 
         arguments = node.args
+        if (
+            arguments.kwarg
+            and arguments.kwarg.arg not in used
+            and self._env.get(arguments.kwarg.arg) == ({},)
+        ):
+            arguments.kwarg = None
         for i in reversed(range(len(arguments.kwonlyargs))):
             if is_decided(arguments.kwonlyargs[i]):
                 del arguments.kwonlyargs[i], arguments.kw_defaults[i]

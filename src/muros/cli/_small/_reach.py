@@ -15,14 +15,12 @@ import ast
 from collections.abc import Collection, Iterable
 from typing import Final
 
-from muros.cli._small._trees import Function, Modules, asks, wholes
+from muros.cli._small._exports import PACKAGES
+from muros.cli._small._trees import Function, Modules, asks, is_pure, wholes
 from muros.cli._small._values import Environment, Knowledge, Known, Values, is_short
 
 _OF_CONTAINERS: Final = {"add", "remove"}
 """Methods of lists and sets that objects have as well; the floor means those of lists and sets."""
-_PURE: Final = frozenset(
-    "bytearray bytes array min max len int list dict set bool ticks_add ticks_diff".split()
-)
 
 
 class Reach(Knowledge):
@@ -139,8 +137,10 @@ class Reach(Knowledge):
     def _refer(self, name: str, place: str | None = None) -> None:
         """Something is taken as a value: whoever has it may call it with anything.
 
-        In ``place`` a name stands for what is defined there, or imported.
+        In ``place`` a name stands for what is defined there, or imported. Packages only hand on what programs take.
         """
+        if self.place in PACKAGES:
+            return
         imported = place is None or any(one == name for _, one in self._imported)
         for known in self.functions.get(name, ()):
             if place is None or (not known.owner and (imported or known.place == place)):
@@ -282,6 +282,8 @@ class Reach(Knowledge):
                 self.place = here
         for name in parameters[:hidden]:
             self.give(function, name, None)
+        if arguments.kwarg:
+            self.give(function, arguments.kwarg.arg, None if others else ({},), explicit=bool(others))
         if arguments.vararg or arguments.kwarg:
             surplus = self._surplus.setdefault(id(function), [])
             if (more, others) not in surplus:
@@ -431,17 +433,6 @@ class Reach(Knowledge):
             else:
                 self._walk(one, {})
         self._class = before
-
-
-def is_pure(node: ast.expr) -> bool:
-    """Whether working it out does nothing else."""
-    for one in ast.walk(node):
-        if isinstance(one, ast.Call):
-            if not (isinstance(one.func, ast.Name) and one.func.id in _PURE):
-                return False
-        elif isinstance(one, ast.Subscript | ast.Yield | ast.YieldFrom | ast.Await | ast.Starred):
-            return False
-    return True
 
 
 def _lent(tree: ast.Module) -> set[str]:

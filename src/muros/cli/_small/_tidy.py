@@ -10,8 +10,7 @@ import ast
 from collections import Counter
 from collections.abc import Iterator
 
-from muros.cli._small._reach import is_pure
-from muros.cli._small._trees import Modules, Substitute, literal, stored
+from muros.cli._small._trees import Modules, Substitute, is_pure, literal, stored
 
 _Body = list[ast.stmt]
 _FOLDED = (

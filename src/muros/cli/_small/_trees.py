@@ -14,6 +14,10 @@ Modules = dict[str, ast.Module]
 
 Function = ast.FunctionDef | ast.Lambda
 
+_PURE = frozenset(
+    "bytearray bytes array min max len int list dict set bool ticks_add ticks_diff hasattr".split()
+)
+
 
 def assigned(scope: ast.Module | ast.ClassDef) -> set[str]:
     """The names that a module or a class assigns."""
@@ -76,6 +80,17 @@ def is_plain(node: ast.expr) -> bool:
     while isinstance(node, ast.Attribute):
         node = node.value
     return isinstance(node, ast.Name)
+
+
+def is_pure(node: ast.expr) -> bool:
+    """Whether working it out does nothing else."""
+    for one in ast.walk(node):
+        if isinstance(one, ast.Call):
+            if not (isinstance(one.func, ast.Name) and one.func.id in _PURE):
+                return False
+        elif isinstance(one, ast.Subscript | ast.Yield | ast.YieldFrom | ast.Await | ast.Starred):
+            return False
+    return True
 
 
 def literal(value: object) -> ast.expr:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, Final
 
-from muros.cli._small._trees import Function, Modules, assigned, is_plain, stored, variables
+from muros.cli._small._trees import Function, Modules, assigned, is_plain, is_pure, stored, variables
 
 Values = tuple[Any, ...] | None
 """The constants that something may be, none while nothing is known; None for anything at all."""
@@ -95,7 +95,8 @@ class Knowledge:
 
     def give_up(self) -> bool:
         """What is asked for although nothing gives it a value may be anything; whether there was such a thing."""
-        asked, self._asked = self._asked - self._gave_up, set()
+        asked = {name for name in self._asked - self._gave_up if not self._attributes.get(name)}
+        self._asked = set()
         self._gave_up |= asked
         return bool(asked)
 
@@ -133,7 +134,7 @@ class Knowledge:
         again = set(stored(node)) | {
             one.arg for each in known.node.body for one in ast.walk(each) if isinstance(one, ast.arg)
         }
-        for one in (*node.args.args, *node.args.kwonlyargs):
+        for one in (*node.args.args, *node.args.kwonlyargs, *filter(None, [node.args.kwarg])):
             values = _values(self._given.get((id(node), one.arg), []))
             if values and one.arg not in again:
                 env[one.arg] = values
@@ -172,7 +173,16 @@ class Knowledge:
         """Whether an expression is true; None where that is open, or where the code is not reached."""
         found = self.values(node, env)
         truths = {bool(one) for one in found or ()}
-        return truths.pop() if len(truths) == 1 else None
+        if len(truths) == 1:
+            return truths.pop()
+        if found is None and isinstance(node, ast.BoolOp):
+            stops = isinstance(node.op, ast.Or)
+            for one in node.values:
+                if self.truth(one, env) is stops:
+                    return stops
+                if not is_pure(one):
+                    break
+        return None
 
     def is_reached(self, test: ast.expr, env: Environment) -> bool:
         """Whether there is a value to decide by."""
