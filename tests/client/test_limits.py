@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from muros.agent.xml import parse_document_untrusted
-from muros.client import CONNECTED, Qos, Session
+from muros.client import CONNECTED, Qos, Session, Tcp, Udp
 from muros.client.hosts import _unused
 from muros.xrce import create_text
 from muros.xrce.constants import DELETE
@@ -54,6 +54,15 @@ def test_a_domain_that_cannot_be(domain: Any) -> None:
 def test_a_session_that_cannot_be(arguments: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Session(Wire(), 1, **arguments)
+
+
+@pytest.mark.parametrize("port", [0, 70000, "8888"])
+@pytest.mark.parametrize("way", [Udp, Tcp])
+def test_a_port_that_cannot_be(way: Any, port: Any) -> None:
+    with pytest.raises(
+        ValueError, match=f"the agent's port is {port!r}: it must be an integer from 1 to 65535"
+    ):
+        Session(way("127.0.0.1", port))
 
 
 @given(

@@ -269,6 +269,14 @@ def test_discovery_of_a_listed_host() -> None:
     assert ("127.0.0.1", data.port) in found
 
 
+def test_discovery_of_one_host() -> None:
+    data, door = UdpLink(0, "127.0.0.1"), DiscoveryLink(0)
+    agent = RunningAgent(data, door)
+    found = discover("127.0.0.1", door.port, attempts=3, timeout=300)
+    agent.stop()
+    assert ("127.0.0.1", data.port) in found
+
+
 def test_discovery_finds_nobody() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as held:
         held.bind(("127.0.0.1", 0))

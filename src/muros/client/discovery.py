@@ -29,7 +29,7 @@ class InfoError(ValueError):
 
 
 def discover(
-    hosts: "tuple[str, ...] | list[str]" = (DISCOVERY_GROUP,),
+    hosts: "str | tuple[str, ...] | list[str]" = (DISCOVERY_GROUP,),
     port: int = DISCOVERY_PORT,
     attempts: int = 1,
     timeout: int = 1000,
@@ -37,14 +37,14 @@ def discover(
 ) -> "list[tuple[str, int]]":
     """Addresses (host, port) of agents, at most ``most``, without doubles.
 
-    ``hosts`` are asked up to ``attempts`` times, until the first answer; answers are waited for ``timeout`` ms each
-    time. Hosts that cannot be reached are passed over.
+    ``hosts``, one or several, are asked up to ``attempts`` times, until the first answer; answers are waited for
+    ``timeout`` ms each time. Hosts that cannot be reached are passed over.
     """
     found: "list[tuple[str, int]]" = []
     sockets: "dict[int, Any]" = {}
     try:
         for _ in range(attempts):
-            for host in hosts:
+            for host in (hosts,) if isinstance(hosts, str) else hosts:
                 _ask(sockets, host, port)
             start = ticks_ms()
             while ticks_diff(ticks_ms(), start) < timeout:

@@ -245,6 +245,9 @@ def _check(
     """Raises TypeError or ValueError for what no session can be made of."""
     if isinstance(transport, type) or not all(hasattr(transport, name) for name in _TRANSPORT):
         raise TypeError(f"{transport!r} is no transport: Session takes one such as Udp('192.168.1.10', 8888)")
+    port = getattr(transport, "_port", 1)
+    if not isinstance(port, int) or not 0 < port <= 0xFFFF:
+        raise ValueError(f"the agent's port is {port!r}: it must be an integer from 1 to 65535")
     if isinstance(client_key, int) and not 0 < client_key <= 0xFFFFFFFF:
         raise ValueError(f"client_key is {client_key:#x}: it must be from 1 to 0xFFFFFFFF")
     if not isinstance(session_id, int) or not 0 < session_id <= 0xFF or session_id == 0x80:

@@ -248,7 +248,7 @@ class Registry:
         if near:
             return f"{text} (did you mean {near[0].replace('/msg/', '/') if shown else near[0]}?)"
         if not same and package not in self.packages():
-            return f"{text}: no package {package!r}; add its folder with add_path() or ${ENV_PATHS}"
+            return f"{text}: no package {package!r}; add its folder with add_path(), ${ENV_PATHS} or --path"
         return text
 
 
