@@ -266,7 +266,10 @@ def test_a_folder_without_definitions_is_an_error(tmp_path: Path) -> None:
         ),
         ("Vector3 b", ":1: unknown type 'my_msgs/Vector3' (did you mean geometry_msgs/Vector3?)"),
         ("Nothing[] b", ":1: unknown type 'my_msgs/Nothing'"),
-        ("gone_msgs/X b", "no package 'gone_msgs'; add its folder with add_path(), $MUROS_INTERFACES or --path"),
+        (
+            "gone_msgs/X b",
+            "no package 'gone_msgs'; add its folder with add_path(), $MUROS_INTERFACES or --path",
+        ),
         ("Probe b", ":1: my_msgs/Probe contains itself"),
         ("Other b", "Other.msg:1: my_msgs/Probe contains itself"),
         ("my_msgs/srv/Ask b", "is a service, not a message"),
