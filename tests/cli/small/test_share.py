@@ -29,7 +29,7 @@ def shared(
 ) -> tuple[Modules, dict[str, str]]:
     """Modules after the pass and the pairs of names; the first is ``muros.m``."""
     modules = {"muros.m": ast.parse(text)} | (others or {})
-    return modules, share(modules, {}, kept, asked)
+    return modules, share(modules, {}, kept, asked, compiled=True)
 
 
 def test_a_function_shares_the_name_of_an_attribute_of_its_module() -> None:

@@ -70,7 +70,7 @@ def small(tree: Tree, programs: Iterable[str], most: int | None = None) -> tuple
     for _ in range(_ROUNDS):
         inline(modules, messages, kept, said.named)
         tidy(modules)
-    pairs = share(modules, messages, kept, asked)
+    pairs = share(modules, messages, kept, asked, compiled=most is None)
     used = identifiers(*modules.values(), *messages.values()) | kept
     names = shortened(modules, kept | set(pairs), used)
     names |= {name: names.get(other, other) for name, other in pairs.items()}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter, defaultdict
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 
 from muros.cli._small._names import COMMON
 from muros.cli._small._trees import Modules, defined, names_of, stored
@@ -18,14 +18,18 @@ _ARGUMENTS = 12  # names that arguments share
 
 
 def share(
-    modules: Modules, messages: Modules, kept: Collection[str], asked: Collection[str]
+    modules: Modules, messages: Modules, kept: Collection[str], asked: Collection[str], compiled: bool
 ) -> dict[str, str]:
     """Gives arguments and variables of functions shared names, and tells which names things of modules may share.
 
     That is, for each of these the name of an attribute; whoever renames the attribute gives both the new name. ``kept``
-    names stay, and nothing gets one of those by which attributes are ``asked`` for.
+    names stay, and nothing gets one of those by which attributes are ``asked`` for. ``compiled``: the result will be,
+    so that names of variables may be long.
     """
-    arguments = _share_variables(modules, kept, {*kept, *_all_names(modules | messages)})
+    used = {*kept, *_all_names(modules | messages)}
+    spare = [name for name in COMMON if name not in used]  # short ones first
+    variables = spare[: _ARGUMENTS - 1 : -1] if compiled else spare[_ARGUMENTS:]
+    arguments = _share_variables(modules, kept, spare[:_ARGUMENTS], variables)
     found = _Mentions(modules | messages)
     free = {
         name: places
@@ -126,10 +130,10 @@ def _top(tree: ast.Module) -> Iterator[str]:
             yield from stored(node)
 
 
-def _share_variables(modules: Modules, kept: Collection[str], used: Collection[str]) -> list[str]:
-    """The same few names, ``used`` for nothing else, for variables of all functions; those that arguments have."""
-    spare = [name for name in COMMON if name not in used]
-    arguments, variables = spare[:_ARGUMENTS], spare[:_ARGUMENTS:-1]
+def _share_variables(
+    modules: Modules, kept: Collection[str], arguments: Sequence[str], variables: Sequence[str]
+) -> list[str]:
+    """The same few names for arguments, and for other variables, of all functions; those that arguments have now."""
     named = {name for tree in modules.values() for name in _keywords(tree)}.union(kept)
     for tree in modules.values():
         top = set(_top(tree))
