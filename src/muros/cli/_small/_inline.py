@@ -16,7 +16,7 @@ from muros.cli._small._bundles import HOME
 from muros.cli._small._frames import MOST
 from muros.cli._small._frames import words as frame
 from muros.cli._small._names import COMMON, STATIC
-from muros.cli._small._trees import WORD, Modules, Substitute, names_of, stored, variables, wholes
+from muros.cli._small._trees import WORD, Modules, Substitute, functions, names_of, stored, variables, wholes
 
 _FIRMWARE = frozenset([*STATIC, *COMMON])  # a method's name may be that of a list's
 _Body = list[ast.stmt]
@@ -38,7 +38,7 @@ def inline(modules: Modules, messages: Modules, kept: Collection[str], named: Co
     unseen = set(named).union(*map(wholes, trees))
     for place, tree in modules.items():
         tried: set[int] = set()
-        while fresh := [found for found in _functions(tree) if id(found[1]) not in tried]:
+        while fresh := [found for found in functions(tree) if id(found[1]) not in tried]:
             for owner, function in fresh:
                 tried.add(id(function))
                 name = function.name
@@ -89,14 +89,6 @@ def _used(place: str, tree: ast.Module) -> Iterator[tuple[str, str]]:
                 yield source, name
 
 
-def _functions(tree: ast.Module) -> Iterator[tuple[ast.ClassDef | None, ast.FunctionDef]]:
-    for node in tree.body:
-        if isinstance(node, ast.FunctionDef):
-            yield None, node
-        elif isinstance(node, ast.ClassDef):
-            yield from ((node, one) for one in node.body if isinstance(one, ast.FunctionDef))
-
-
 def _is_simple(function: ast.FunctionDef) -> bool:
     """Whether nothing in it needs a function of its own."""
     arguments = function.args
@@ -126,7 +118,7 @@ class _Place:
 
         What stays in memory runs for each message: there no frame may become too large for the stack.
         """
-        for _, caller in _functions(tree):
+        for _, caller in functions(tree):
             if caller is not self._function and any(self._is_call(node) for node in ast.walk(caller)):
                 if variables(caller) & _free(self._function):
                     return  # what the function means by a name is another thing there

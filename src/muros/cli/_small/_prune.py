@@ -12,6 +12,7 @@ from muros.cli._small._trees import (
     Function,
     Modules,
     Substitute,
+    Transformer,
     is_plain,
     is_pure,
     literal,
@@ -44,8 +45,7 @@ def unlend(modules: Modules) -> None:
         for scope in scopes:
             looked = {place for node in scope.body for place in _lenders(node)}
             if looked and not any(_gives(modules, place) for place in looked):
-                scope.body = [one for one in scope.body if not _lenders(one) and not _looks(one)]
-                scope.body = scope.body or [ast.Pass()]
+                scope.body = [one for one in scope.body if not _looks(one)] or [ast.Pass()]
 
 
 def _lenders(node: ast.stmt) -> set[str]:
@@ -57,7 +57,11 @@ def _lenders(node: ast.stmt) -> set[str]:
 
 
 def _looks(node: ast.stmt) -> bool:
-    return isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__getattr__"
+    """Whether a statement has to do with looking elsewhere."""
+    match node:
+        case ast.Assign(targets=[ast.Name(id="__getattr__")]):
+            return True
+    return bool(_lenders(node))
 
 
 def _gives(modules: Modules, place: str) -> bool:
@@ -89,19 +93,13 @@ def _pruned(tree: ast.Module, place: str, reach: Reach, idle: Collection[str]) -
     return out
 
 
-class _Pruner(ast.NodeTransformer):
+class _Pruner(Transformer, ast.NodeTransformer):
     """Decides what is decided, and takes out what is not reached or has no effect."""
 
     def __init__(self, reach: Reach, idle: Collection[str]) -> None:
         self._reach = reach
         self._idle = idle
         self._env: Environment = {}
-
-    def generic_visit(self, node: ast.AST) -> ast.AST:
-        super().generic_visit(node)
-        if getattr(node, "body", None) == [] and not isinstance(node, ast.Module):
-            node.body = [ast.Pass()]  # type: ignore[attr-defined]
-        return node
 
     # Functions and classes
 

@@ -12,7 +12,7 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Sequence
 
 from muros.cli._small._names import COMMON
-from muros.cli._small._trees import Modules, defined, names_of, stored
+from muros.cli._small._trees import Modules, defined, functions, identifiers, names_of, stored
 
 _ARGUMENTS = 12  # names that arguments share
 
@@ -26,7 +26,7 @@ def share(
     names stay, and nothing gets one of those by which attributes are ``asked`` for. ``compiled``: the result will be,
     so that names of variables may be long.
     """
-    used = {*kept, *_all_names(modules | messages)}
+    used = {*kept, *identifiers(*modules.values(), *messages.values())}
     spare = [name for name in COMMON if name not in used]  # short ones first
     variables = spare[: _ARGUMENTS - 1 : -1] if compiled else spare[_ARGUMENTS:]
     arguments = _share_variables(modules, kept, spare[:_ARGUMENTS], variables)
@@ -97,7 +97,7 @@ def _pairs(
     Names that are said often are given first: those that a module defines have the lowest numbers in its compiled file,
     and a number below 128 takes one byte.
     """
-    often = Counter(name for tree in modules.values() for name in _all_names({"": tree}))
+    often = Counter(name for tree in modules.values() for node in ast.walk(tree) for name in names_of(node))
     single = {
         name
         for tree in modules.values()
@@ -137,7 +137,7 @@ def _share_variables(
     named = {name for tree in modules.values() for name in _keywords(tree)}.union(kept)
     for tree in modules.values():
         top = set(_top(tree))
-        for function in _functions(tree):
+        for _, function in functions(tree):
             given = dict.fromkeys(node.arg for node in ast.walk(function) if isinstance(node, ast.arg))
             own = [name for name in given if name not in top | named]
             others = [
@@ -145,7 +145,7 @@ def _share_variables(
             ]
             new = zip(own, arguments, strict=False), zip(others, variables, strict=False)
             _Variables({old: one for pairs in new for old, one in pairs}).visit(function)
-    said = set(_all_names(modules))
+    said = identifiers(*modules.values())
     return [name for name in arguments if name in said]
 
 
@@ -176,15 +176,3 @@ def _keywords(tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.keyword) and node.arg:
             yield node.arg
-
-
-def _functions(tree: ast.Module) -> Iterator[ast.FunctionDef]:
-    classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
-    for body in (tree.body, *(node.body for node in classes)):
-        yield from (node for node in body if isinstance(node, ast.FunctionDef))
-
-
-def _all_names(trees: Modules) -> Iterator[str]:
-    for tree in trees.values():
-        for node in ast.walk(tree):
-            yield from names_of(node)

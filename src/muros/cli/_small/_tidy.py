@@ -10,7 +10,7 @@ import ast
 from collections import Counter
 from collections.abc import Iterator
 
-from muros.cli._small._trees import Modules, Substitute, is_pure, literal, stored
+from muros.cli._small._trees import Modules, Substitute, Transformer, is_pure, literal, stored
 
 _Body = list[ast.stmt]
 _FOLDED = (
@@ -26,7 +26,7 @@ def tidy(modules: Modules) -> None:
         _Tidy().visit(tree)
 
 
-class _Tidy(ast.NodeTransformer):
+class _Tidy(Transformer, ast.NodeTransformer):
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         self.generic_visit(node)
         names = Counter(one.id for one in ast.walk(node) if isinstance(one, ast.Name))
@@ -39,22 +39,15 @@ class _Tidy(ast.NodeTransformer):
         _at_once(node, {name for name in once if names[name] == 2})
         return node
 
-    def generic_visit(self, node: ast.AST) -> ast.AST:
-        super().generic_visit(node)
-        if getattr(node, "body", None) == [] and not isinstance(node, ast.Module):
-            node.body = [ast.Pass()]  # type: ignore[attr-defined]
-        return node
-
     # Decided branches
 
-    def visit_If(self, node: ast.If) -> ast.AST | _Body | None:
-        self.generic_visit(node)
-        node.test = _tested(node.test)
-        if isinstance(node.test, ast.Constant):
-            return node.body if node.test.value else node.orelse
-        return node
+    def visit_If(self, node: ast.If) -> ast.AST | _Body:
+        return self._branch(node)
 
-    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST | _Body:
+        return self._branch(node)
+
+    def _branch(self, node: ast.If | ast.IfExp) -> ast.AST | _Body:
         self.generic_visit(node)
         node.test = _tested(node.test)
         if isinstance(node.test, ast.Constant):

@@ -36,6 +36,15 @@ def defined(tree: ast.Module) -> set[str]:
     return made | assigned(tree)
 
 
+def functions(tree: ast.Module) -> Iterator[tuple[ast.ClassDef | None, ast.FunctionDef]]:
+    """The functions of a module and, with their class, the methods."""
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef):
+            yield None, node
+        elif isinstance(node, ast.ClassDef):
+            yield from ((node, one) for one in node.body if isinstance(one, ast.FunctionDef))
+
+
 def stored(node: ast.AST) -> Iterator[str]:
     """The variables that code gives values."""
     for one in ast.walk(node):
@@ -150,4 +159,14 @@ class Substitute(ast.NodeTransformer):
         value = self._names.get(shown)
         if isinstance(value, ast.Name) and value.id != shown:
             node.asname = value.id
+        return node
+
+
+class Transformer(ast.NodeTransformer):
+    """One that leaves nothing without a body."""
+
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        super().generic_visit(node)
+        if getattr(node, "body", None) == [] and not isinstance(node, ast.Module):
+            node.body = [ast.Pass()]  # type: ignore[attr-defined]
         return node
