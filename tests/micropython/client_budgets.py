@@ -3,8 +3,7 @@
 Code is measured as a board has it that is connected and steady: what only making, connecting, creating, mending and
 closing need is borrowed and gone by then (see ``muros.compat``), which ``test_client_budgets`` holds. Most limits are
 the promises. A floor that is made small for its program keeps them, see ``muros.cli._small``: its rows say "small". The
-others stand a little above the figures of today, so that they do not get worse, and so does the bytecode of the small
-core, of which 16 kB was hoped for.
+others stand a little above the figures of today, so that they do not get worse.
 """
 
 from collections.abc import Callable, Iterator, Sequence
