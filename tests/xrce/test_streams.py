@@ -3,7 +3,7 @@
 import struct
 from typing import Any
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from muros.xrce._types import Buffer, Send
@@ -119,6 +119,7 @@ steps = st.lists(
 
 
 @given(starts, windows, steps)
+@example(0, 2, [("message", 1, b"\0"), ("message", 1, b"\0\0"), ("heartbeat", 1, 0)])
 def test_a_receiver_does_what_the_book_says(start: int, window: int, told: list[Any]) -> None:
     stream, model = make_input(0x80, 8, window), Model(start, window)
     stream.expected = start

@@ -59,15 +59,16 @@ def heartbeat(session: "SessionCore", stream: "Input", buf: "Buffer", at: int) -
 def accept(stream: "Input", ahead: int, buf: "Buffer", off: int, n: int) -> bool:
     """Whether the message ``ahead`` of the expected one is to be handled now.
 
-    One that came early is kept, others are dropped; what is longer than the MTU or the heap is sent again.
+    One that came early is kept, and not what comes under its number afterwards; others are dropped; what is longer than the MTU or the heap is sent again.
     """
     if ahead >= stream.window:
         return False
     if ahead >= stream.known:
         stream.known = ahead + 1
-    if ahead and n <= stream.mtu:
+    number = stream.expected + ahead & 0xFFFF
+    if ahead and n <= stream.mtu and number not in stream.early:
         try:
-            stream.early[stream.expected + ahead & 0xFFFF] = bytes(memoryview(buf)[off : off + n])
+            stream.early[number] = bytes(memoryview(buf)[off : off + n])
         except MemoryError:
             pass
     return ahead == 0
