@@ -59,7 +59,8 @@ def heartbeat(session: "SessionCore", stream: "Input", buf: "Buffer", at: int) -
 def accept(stream: "Input", ahead: int, buf: "Buffer", off: int, n: int) -> bool:
     """Whether the message ``ahead`` of the expected one is to be handled now.
 
-    One that came early is kept, and not what comes under its number afterwards; others are dropped; what is longer than the MTU or the heap is sent again.
+    One that came early is kept, and what comes under its number afterwards is not; others are dropped. What is longer
+    than the MTU or the heap is sent again.
     """
     if ahead >= stream.window:
         return False
